@@ -1,0 +1,53 @@
+# make alone says what there is.
+SHELL := /bin/bash
+JOBS ?= $(shell nproc)
+BUILD := build/release
+
+.PHONY: help install build test demo sanitize clang bench format tidy clean
+
+help:
+	@echo "Angiospline: vessels to CAD."
+	@echo
+	@echo "  make demo      install what is missing, build, run the main job on the built-in sample"
+	@echo "  make test      install, build, run all tests"
+	@echo "  make build     install, build: the program is $(BUILD)/cli/angiospline"
+	@echo "  make sanitize  all tests under the address and undefined-behaviour sanitizers"
+	@echo "  make clang     build and test with clang 14"
+	@echo "  make bench     build and run the benchmarks"
+	@echo "  make format    clang-format every source file; make tidy: clang-tidy"
+	@echo "  make clean     remove build/ and out/"
+
+install:
+	@scripts/install_packages.sh
+
+build: install
+	@scripts/build.sh release
+
+test: build
+	@scripts/run_tests.sh release
+
+demo: build
+	@scripts/demo.sh $(BUILD)/cli/angiospline out/demo
+
+sanitize: install
+	@scripts/build.sh sanitize
+	@scripts/run_tests.sh sanitize
+
+clang: install
+	@scripts/install_packages.sh scripts/packages-dev.txt
+	@scripts/build.sh clang
+	@scripts/run_tests.sh clang
+
+bench: install
+	@scripts/bench.sh
+
+format:
+	@scripts/install_packages.sh scripts/packages-dev.txt
+	@git ls-files '*.h' '*.cpp' | xargs clang-format-14 -i
+
+tidy: build
+	@scripts/install_packages.sh scripts/packages-dev.txt
+	@git ls-files '*.cpp' | grep -v '^tests/\|^benches/' | xargs -P $(JOBS) -n 4 clang-tidy-14 --quiet -p $(BUILD)
+
+clean:
+	rm -rf build out

@@ -1,0 +1,63 @@
+// One construction for every junction of three or more branches.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "modeling/surface_network.h"
+
+namespace angiospline {
+
+// A branch as its junction sees it: a ray from the centre with a radius.
+struct JunctionBranch {
+  std::string name;
+  Vec3 direction = Vec3::Zero();  // unit, away from the centre
+  double radius_mm = 0.0;
+  double longest_mm = 0.0;        // the opening must lie no farther than this from the centre
+};
+
+struct JunctionSpec {
+  std::string name;
+  Vec3 center_mm = Vec3::Zero();
+  std::vector<JunctionBranch> branches;
+};
+
+// Where a body meets the junction: a plane circle of arcs, one for each sector of the branch.
+// Sector k lies between seams k and k + 1, counter-clockwise seen against `axis` (from outside,
+// looking at the junction), and is side kU0 of patches[k], whose v runs the same way.
+// Contract with the body: the arcs lie in the plane of the opening, neighbouring arcs meet with equal
+// derivatives at the seams, and the junction's tangent plane along them contains `axis`.
+struct JunctionOpening {
+  Vec3 center_mm = Vec3::Zero();
+  Vec3 axis = Vec3::Zero();        // unit, away from the junction: the branch's direction
+  double radius_mm = 0.0;
+  std::vector<Vec3> seams;         // unit, orthogonal to axis: from the centre to each seam point
+  std::vector<int> patches;        // of Junction::network
+};
+
+struct Junction {
+  SurfaceNetwork network;                 // all patches in one region; openings are not rims
+  std::vector<JunctionOpening> openings;  // one for each branch, in the order of the spec
+  double worst_angle_deg = 0.0;           // between the normals of neighbouring patches
+  double jacobian_ratio = 0.0;            // least |Su x Sv| over its mean on the same patch
+  double curvature_times_radius = 0.0;    // largest curvature times the smallest branch radius
+  int attempts = 1;                       // settings tried before one passed every gate
+};
+
+struct JunctionOptions {
+  double margin = 1.0;      // opening beyond the blend, in radii of the branch
+  double blend = 0.15;      // width of the blend between branches, in radii
+};
+
+// How far from the centre each branch's opening comes to lie, in mm; the order of the spec.
+// Errors: fewer than three branches, a radius that is not positive and finite, two branches in the
+// same direction; each names the junction and the branches.
+Result<std::vector<double>> opening_distances_mm(const JunctionSpec& spec,
+                                                 const JunctionOptions& options = {});
+
+// The junction's patches. Errors: those of opening_distances_mm; a branch too short for its opening;
+// no setting gives a surface that passes every gate (the message names the best try's failure).
+Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options = {});
+
+}  // namespace angiospline
