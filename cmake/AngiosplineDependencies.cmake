@@ -31,3 +31,11 @@ if(NOT TARGET Angiospline::ITK)
   target_include_directories(Angiospline::ITK SYSTEM INTERFACE ${ITK_INCLUDE_DIRS})
   target_link_libraries(Angiospline::ITK INTERFACE ${ITK_LIBRARIES})
 endif()
+
+# Only the file formats of VTK: a bare find_package would pull in all of it, windows and Python too.
+find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOCore IOLegacy IOXML)
+if(NOT TARGET Angiospline::VTK)
+  add_library(Angiospline::VTK INTERFACE IMPORTED)
+  target_link_libraries(Angiospline::VTK INTERFACE
+    VTK::CommonCore VTK::CommonDataModel VTK::IOCore VTK::IOLegacy VTK::IOXML)
+endif()
