@@ -20,6 +20,7 @@ if(NOT TARGET Angiospline::OpenCASCADE)
     TKTopAlgo TKPrim TKBool TKBO TKFillet TKGeomAlgo TKBRep TKGeomBase TKG3d TKG2d TKMath TKernel)
 endif()
 
+# Only the readers and writers that io/image_file_itk.cpp names: no filters, no factories.
 # Debian packages GDCM's programs apart; ITK's notes on them are of no use here.
 set(_angiospline_log_level ${CMAKE_MESSAGE_LOG_LEVEL})
 set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
@@ -29,7 +30,8 @@ set(CMAKE_MESSAGE_LOG_LEVEL ${_angiospline_log_level})
 if(NOT TARGET Angiospline::ITK)
   add_library(Angiospline::ITK INTERFACE IMPORTED)
   target_include_directories(Angiospline::ITK SYSTEM INTERFACE ${ITK_INCLUDE_DIRS})
-  target_link_libraries(Angiospline::ITK INTERFACE ${ITK_LIBRARIES})
+  target_link_libraries(Angiospline::ITK INTERFACE
+    ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta ITKIOGDCM ITKIOTIFF ITKIOPNG ITKCommon)
 endif()
 
 # Only the file formats of VTK: a bare find_package would pull in all of it, windows and Python too.
