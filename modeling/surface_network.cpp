@@ -174,6 +174,12 @@ Vec2 side_parameters(const Patch& patch, PatchSide side, double t) {
 }
 
 std::optional<Error> find_defect(const SurfaceNetwork& network) {
+  for (Eigen::Index c = 0; c < network.control_points_mm.cols(); ++c) {
+    if (!network.control_points_mm.col(c).allFinite()) {
+      return defect("control point is not finite", "control point " + std::to_string(c), {},
+                    "coordinates are finite");
+    }
+  }
   for (const Region& region : network.regions) {
     if (region.name.empty()) return defect("region has no name", "network", {}, "regions are named");
   }

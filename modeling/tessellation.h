@@ -1,0 +1,44 @@
+// A surface network as one closed triangle mesh.
+#pragma once
+
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "modeling/surface_network.h"
+#include "modeling/triangle_mesh.h"
+
+namespace angiospline {
+
+struct TessellationOptions {
+  // Goal for the distance between triangles and surface, in vessel radii of the region; a circle
+  // gets 2 pi / acos(1 - chord_tolerance) chords or more.
+  double chord_tolerance = 0.01;
+  double chord_tolerance_mm = 1e9;  // the same in mm; the smaller one counts
+  double longest_edge =
+      0.75;  // of the wall's triangles, in radii: no slivers along straight vessels
+};
+
+// Where on the network a point of the mesh lies; a cap's centre has patch -1.
+struct SurfacePoint {
+  int patch = -1;
+  Vec2 uv = Vec2::Zero();
+};
+
+struct Tessellation {
+  TriangleMesh mesh;                  // parts: the regions, then the rims, in order
+  std::vector<SurfacePoint> origins;  // one for each point; one of several on a shared edge
+};
+
+// A mesh whose patches share the points of their joins and whose rims are closed by plane caps: it
+// is closed, oriented outward and has the network's topology by construction, whatever the
+// geometry. All points but the caps' centres lie on the surface. Edges are divided by the larger
+// demand of their two sides; the spacing comes from Filip, Magedson, Markot (1986): error <= (hu^2
+// |n.Suu| + 2 hu hv |n.Suv| + hv^2 |n.Svv|) / 8, with the second derivatives sampled, not bounded.
+// Caps must be star-shaped about the mean of their rim. Requires positive options.
+// Errors: the first defect of the network; stopped on request. O(triangles).
+Result<Tessellation> tessellate(const SurfaceNetwork& network,
+                                const TessellationOptions& options = {},
+                                const Progress& progress = {});
+
+}  // namespace angiospline
