@@ -1,43 +1,85 @@
 #include "kernel/basis.h"
 
+#include <algorithm>
+#include <array>
+
 #include "base/contract.h"
 
 namespace angiospline {
+namespace {
+
+// Raises the functions of degree d - 1 on a span to degree d, in place: `row` holds d values and
+// gets d + 1; U points at knot(span).
+inline void raise_degree(const double* U, double t, int d, double* row) {
+  double carried = 0;
+  for (int j = 0; j < d; ++j) {
+    const double left = U[1 - d + j];
+    const double right = U[1 + j];
+    const double share = row[j] / (right - left);
+    row[j] = carried + share * (right - t);
+    carried = share * (t - left);
+  }
+  row[d] = carried;
+}
+
+// The derivatives of degree-d functions from values of degree d - 1 (difference quotients).
+inline void raise_derivative(const double* U, int d, double* row) {
+  double carried = 0;
+  for (int j = 0; j < d; ++j) {
+    const double share = d * row[j] / (U[1 + j] - U[1 - d + j]);
+    row[j] = carried - share;
+    carried = share;
+  }
+  row[d] = carried;
+}
+
+// kFixed > 0 is the degree known at compile time, so that every loop unrolls.
+template <int kFixed>
+void fill(const double* U, int degree, double t, int derivatives, double* out) {
+  const int p = kFixed > 0 ? kFixed : degree;
+  const int order = p + 1;
+  // Row k waits at degree p - k until the value row has passed it, then is differentiated k times.
+  out[0] = 1;
+  for (int d = 1; d <= p; ++d) {
+    const int k = p - d + 1;  // the value row is now at degree d - 1 = p - k
+    if (k <= derivatives) std::copy(out, out + d, out + k * order);
+    raise_degree(U, t, d, out);
+  }
+  for (int k = 1; k <= std::min(derivatives, p); ++k) {
+    for (int d = p - k + 1; d <= p; ++d) raise_derivative(U, d, out + k * order);
+  }
+  for (int k = p + 1; k <= derivatives; ++k) std::fill_n(out + k * order, order, 0.0);
+}
+
+}  // namespace
+
+void basis_on_span(const KnotVector& knots, int span, double t, int derivatives, double* out) {
+  const double* U = knots.knots().data() + span;
+  switch (const int p = knots.degree()) {
+    case 1:
+      return fill<1>(U, p, t, derivatives, out);
+    case 2:
+      return fill<2>(U, p, t, derivatives, out);
+    case 3:
+      return fill<3>(U, p, t, derivatives, out);
+    case 4:
+      return fill<4>(U, p, t, derivatives, out);
+    case 5:
+      return fill<5>(U, p, t, derivatives, out);
+    case 6:
+      return fill<6>(U, p, t, derivatives, out);
+    case 7:
+      return fill<7>(U, p, t, derivatives, out);
+    default:
+      return fill<0>(U, p, t, derivatives, out);
+  }
+}
 
 BasisValues basis_at(const KnotVector& knots, double t, int derivatives, int span_hint) {
-  EXPECTS(derivatives >= 0);
-  const int p = knots.degree();
+  EXPECTS(derivatives >= 0 && derivatives <= KnotVector::kMaxDegree);
   const int span = knots.span(t, span_hint);
-
-  // lower(d, j): the j-th function of degree d that lives on the span.
-  Eigen::MatrixXd lower = Eigen::MatrixXd::Zero(p + 1, p + 1);
-  lower(0, 0) = 1;
-  for (int d = 1; d <= p; ++d) {
-    for (int j = 0; j < d; ++j) {
-      const double left = knots[span + 1 - d + j];
-      const double right = knots[span + 1 + j];
-      const double share = lower(d - 1, j) / (right - left);
-      lower(d, j) += share * (right - t);
-      lower(d, j + 1) += share * (t - left);
-    }
-  }
-
-  BasisValues result{span - p, Eigen::MatrixXd::Zero(derivatives + 1, p + 1)};
-  result.values.row(0) = lower.row(p);
-  for (int k = 1; k <= std::min(derivatives, p); ++k) {
-    // Differentiate k times: start from degree p - k and raise by difference quotients.
-    Eigen::VectorXd current = lower.row(p - k).head(p - k + 1);
-    for (int d = p - k + 1; d <= p; ++d) {
-      Eigen::VectorXd next = Eigen::VectorXd::Zero(d + 1);
-      for (int j = 0; j < d; ++j) {
-        const double share = d * current(j) / (knots[span + 1 + j] - knots[span + 1 - d + j]);
-        next(j) -= share;
-        next(j + 1) += share;
-      }
-      current = next;
-    }
-    result.values.row(k) = current;
-  }
+  BasisValues result{span - knots.degree(), BasisValues::Matrix(derivatives + 1, knots.order())};
+  basis_on_span(knots, span, t, derivatives, result.values.data());
   return result;
 }
 

@@ -7,15 +7,24 @@
 
 namespace angiospline {
 
-// The order() basis functions that do not vanish on a span, and their derivatives.
+// The order() basis functions that do not vanish on a span, and their derivatives. The matrix lives
+// inside the object: no allocation.
 struct BasisValues {
-  int first;                // index of the first basis function: span - degree
-  Eigen::MatrixXd values;   // row d: d-th derivatives; column j: basis function first + j
+  static constexpr int kMax = KnotVector::kMaxDegree + 1;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMax, kMax>;
+
+  int first;      // index of the first basis function: span - degree
+  Matrix values;  // row d: d-th derivatives; column j: basis function first + j
 };
 
 // Derivatives 0 .. derivatives at t; one-sided from the right, from the left at the end of the
-// domain. Outside the domain the end polynomials are continued. O(degree^2).
+// domain. Outside the domain the end polynomials are continued. Rows above the degree are zero.
+// Requires derivatives <= kMaxDegree. O(degree^2). No allocation.
 // Reference: The NURBS Book, algorithms A2.2 and A2.3 (de Boor's recurrence).
 BasisValues basis_at(const KnotVector& knots, double t, int derivatives = 0, int span_hint = -1);
+
+// The same on a span the caller knows; row d starts at out[d * order]. Requires a span of positive
+// length and room for (derivatives + 1) * order doubles. Fixed-degree code up to degree 7.
+void basis_on_span(const KnotVector& knots, int span, double t, int derivatives, double* out);
 
 }  // namespace angiospline

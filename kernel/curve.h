@@ -1,8 +1,9 @@
 // B-spline curves in 1 to 4 dimensions.
 #pragma once
 
-#include <Eigen/Core>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "base/contract.h"
 #include "kernel/basis.h"

@@ -21,6 +21,10 @@ Result<KnotVector> KnotVector::make(int degree, std::vector<double> knots) {
     return fail({ErrorKind::kBadInput, "degree is negative", "knot vector", std::to_string(degree),
                  "degree must be at least 0"});
   }
+  if (degree > kMaxDegree) {
+    return fail({ErrorKind::kBadInput, "degree is too high", "knot vector", std::to_string(degree),
+                 "degree must be at most " + std::to_string(kMaxDegree)});
+  }
   const std::size_t order = static_cast<std::size_t>(degree) + 1;
   if (knots.size() < 2 * order) {
     return fail({ErrorKind::kBadInput, "too few knots", "knot vector", std::to_string(knots.size()),
@@ -54,7 +58,7 @@ KnotVector KnotVector::bezier(int degree, double first, double last) {
 
 KnotVector KnotVector::clamped(int degree, const std::vector<double>& breakpoints,
                                int multiplicity) {
-  EXPECTS(degree >= 0 && breakpoints.size() >= 2);
+  EXPECTS(degree >= 0 && degree <= kMaxDegree && breakpoints.size() >= 2);
   EXPECTS(multiplicity >= 1 && multiplicity <= degree + 1);
   std::vector<double> knots;
   for (std::size_t i = 0; i < breakpoints.size(); ++i) {
@@ -82,9 +86,11 @@ int KnotVector::span(double t, int hint) const {
 double KnotVector::greville(int i) const {
   EXPECTS(i >= 0 && i < control_point_count());
   if (degree_ == 0) return 0.5 * ((*this)[i] + (*this)[i + 1]);
+  // Differences from the first knot: exact where all are equal, and never outside the knots.
+  const double base = (*this)[i + 1];
   double sum = 0;
-  for (int k = i + 1; k <= i + degree_; ++k) sum += (*this)[k];
-  return sum / degree_;
+  for (int k = i + 2; k <= i + degree_; ++k) sum += (*this)[k] - base;
+  return std::min(base + sum / degree_, (*this)[i + degree_]);
 }
 
 std::vector<double> KnotVector::greville() const {

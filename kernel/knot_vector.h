@@ -11,18 +11,22 @@ namespace angiospline {
 //   1. degree >= 0 and at least 2 (degree + 1) knots;
 //   2. knots are finite and do not decrease;
 //   3. no knot has a multiplicity above degree + 1;
-//   4. the domain [knot(degree), knot(control_point_count)] has positive length.
+//   4. the domain [knot(degree), knot(control_point_count)] has positive length;
+//   5. degree <= kMaxDegree, so that evaluators can work on the stack.
 // False: "the ends are clamped" (a floating end is legal), "spans have positive length".
 // Reference: Lyche & Morken, Spline Methods, chapter 2; Piegl & Tiller, The NURBS Book, 2.2.
 class KnotVector {
  public:
+  static constexpr int kMaxDegree = 31;  // the triple curve of two patches of degree 10 has 29
+
   // An error names the first broken invariant, its index and its value.
   static Result<KnotVector> make(int degree, std::vector<double> knots);
 
   // One polynomial span on [first, last]: the Bernstein basis.
   static KnotVector bezier(int degree, double first = 0.0, double last = 1.0);
 
-  // Clamped ends; `breakpoints` strictly increasing, at least two; interior ones get `multiplicity`.
+  // Clamped ends; `breakpoints` strictly increasing, at least two; interior ones get
+  // `multiplicity`.
   static KnotVector clamped(int degree, const std::vector<double>& breakpoints,
                             int multiplicity = 1);
 

@@ -1,8 +1,10 @@
 // Tensor-product B-spline surfaces in 2 to 4 dimensions.
 #pragma once
 
-#include <Eigen/Core>
 #include <utility>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "base/contract.h"
 #include "kernel/basis.h"

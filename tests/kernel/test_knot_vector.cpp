@@ -1,8 +1,7 @@
-#include "kernel/knot_vector.h"
-
 #include <gtest/gtest.h>
 
 #include "kernel/curve.h"
+#include "kernel/knot_vector.h"
 
 namespace angiospline {
 namespace {

@@ -1,0 +1,47 @@
+// Curves and surfaces at many parameters at once.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "kernel/curve.h"
+#include "kernel/surface.h"
+
+namespace angiospline {
+
+// A surface and its partial derivatives on a grid of parameters.
+template <int D>
+struct SurfaceGrid {
+  using Points = Eigen::Matrix<double, D, Eigen::Dynamic>;
+
+  int u_count = 0;
+  int v_count = 0;
+  int derivatives = 0;
+  std::vector<Points> partials;  // see partial()
+
+  // d^(a+b) S / du^a dv^b at every grid point, a + b <= derivatives; point (i, j) is column
+  // i * v_count + j. a = b = 0: the points.
+  const Points& partial(int a, int b) const {
+    return partials[static_cast<std::size_t>((a + b) * (a + b + 1) / 2 + b)];
+  }
+  const Points& points() const { return partials.front(); }
+};
+
+// All partials up to total order `derivatives` at (us[i], vs[j]). The tensor structure is used:
+// basis functions are computed once for each parameter, and u is contracted before v. D is 1 to 4.
+// O(|us| |vs| order_v) after O(|us| v_count order_u).
+template <int D>
+SurfaceGrid<D> evaluate_grid(const BSplineSurface<D>& surface, const std::vector<double>& us,
+                             const std::vector<double>& vs, int derivatives = 0);
+
+// The k-th derivative of a curve at every parameter, one column each.
+template <int D>
+Eigen::Matrix<double, D, Eigen::Dynamic> evaluate(const BSplineCurve<D>& curve,
+                                                  const std::vector<double>& parameters,
+                                                  int derivative = 0);
+
+// `count` parameters from `first` to `last`, both included and exact. Requires count >= 2.
+std::vector<double> spaced(double first, double last, int count);
+
+}  // namespace angiospline

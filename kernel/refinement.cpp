@@ -1,0 +1,236 @@
+#include "kernel/refinement.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "base/contract.h"
+
+namespace angiospline {
+namespace {
+
+constexpr int kMaxOrder = KnotVector::kMaxDegree + 1;
+
+// Knots with `degree` copies of the end knots beyond each end, so that windows at floating ends
+// stay in range; whatever the copies contribute belongs to columns that do not exist.
+class PaddedKnots {
+ public:
+  explicit PaddedKnots(const KnotVector& knots) : pad_(knots.degree() + 1) {
+    const std::vector<double>& U = knots.knots();
+    padded_.reserve(U.size() + 2 * static_cast<std::size_t>(pad_));
+    padded_.insert(padded_.end(), static_cast<std::size_t>(pad_), U.front());
+    padded_.insert(padded_.end(), U.begin(), U.end());
+    padded_.insert(padded_.end(), static_cast<std::size_t>(pad_), U.back());
+  }
+  const double* at(int i) const { return padded_.data() + pad_ + i; }
+
+ private:
+  int pad_;
+  std::vector<double> padded_;
+};
+
+// One step of the discrete B-spline recurrence: `row` goes from degree d - 1 to d. left[d - 1 - j]
+// walks down from the interval, right[j] up; x is the knot of the fine vector for this level.
+inline void discrete_step(const double* left, const double* right, double x, int d, double* row) {
+  double carried = 0;
+  for (int j = 0; j < d; ++j) {
+    const double l = left[j - d];
+    const double r = right[j];
+    const double share = row[j] / (r - l);
+    row[j] = carried + share * (r - x);
+    carried = share * (x - l);
+  }
+  row[d] = carried;
+}
+
+}  // namespace
+
+Result<KnotVector> with_knots(const KnotVector& knots, std::vector<double> added) {
+  std::sort(added.begin(), added.end());
+  for (const double t : added) {
+    if (!(t >= knots.first() && t <= knots.last())) {
+      return fail({ErrorKind::kBadInput, "new knot is outside the domain", "knot vector",
+                   std::to_string(t),
+                   "must be in [" + std::to_string(knots.first()) + ", " +
+                       std::to_string(knots.last()) + "]"});
+    }
+  }
+  std::vector<double> merged(knots.knots().size() + added.size());
+  std::merge(knots.knots().begin(), knots.knots().end(), added.begin(), added.end(),
+             merged.begin());
+  return KnotVector::make(knots.degree(), std::move(merged));
+}
+
+bool is_refinement(const KnotVector& coarse, const KnotVector& fine) {
+  return coarse.degree() == fine.degree() && coarse.first() == fine.first() &&
+         coarse.last() == fine.last() && coarse.knots().front() <= fine.knots().front() &&
+         fine.knots().back() <= coarse.knots().back() &&
+         std::includes(fine.knots().begin(), fine.knots().end(), coarse.knots().begin(),
+                       coarse.knots().end());
+}
+
+CompactRows refinement_matrix_oslo(const KnotVector& coarse, const KnotVector& fine) {
+  EXPECTS(is_refinement(coarse, fine));
+  const int p = coarse.degree();
+  const PaddedKnots tau(coarse);
+  CompactRows A(fine.control_point_count(), coarse.control_point_count(), p + 1);
+  std::array<double, kMaxOrder> row;
+  int mu = 0;
+  for (int i = 0; i < A.rows(); ++i) {
+    while (coarse[mu + 1] <= fine[i]) ++mu;  // tau(mu) <= fine(i) < tau(mu + 1)
+    row[0] = 1;
+    for (int d = 1; d <= p; ++d) {
+      discrete_step(tau.at(mu + 1), tau.at(mu + 1), fine[i + d], d, row.data());
+    }
+    A.set_row(i, mu - p, row.data(), p + 1);
+  }
+  return A;
+}
+
+// In blossom terms row i is f[t(i+1) .. t(i+p)] written in the coarse control points
+// f[tau(j+1) .. tau(j+p)]. Old knots tau(q+1) .. tau(q+p-nu) inside the window stay as arguments of
+// every point involved; over the other nu arguments it is a blossom of degree nu, whose knots are
+// the nu old ones before and after the fixed ones.
+CompactRows refinement_matrix(const KnotVector& coarse, const KnotVector& fine) {
+  EXPECTS(is_refinement(coarse, fine));
+  const int p = coarse.degree();
+  const PaddedKnots tau(coarse);
+  const double* t = fine.knots().data();
+  const int total = static_cast<int>(fine.knots().size());
+
+  // old_before[k]: old knots among t(0) .. t(k - 1), equal values matched in order.
+  std::vector<int> old_before(static_cast<std::size_t>(total) + 1, 0);
+  const int coarse_total = static_cast<int>(coarse.knots().size());
+  for (int k = 0, old = 0; k < total; ++k) {
+    if (old < coarse_total && t[k] == coarse[old]) ++old;
+    old_before[static_cast<std::size_t>(k) + 1] = old;
+  }
+
+  CompactRows A(fine.control_point_count(), coarse.control_point_count(), p + 1);
+  std::array<double, kMaxOrder> row;
+  for (int i = 0; i < A.rows(); ++i) {
+    const int* before = old_before.data() + i + 1;
+    const int q = before[0] - 1;                 // last old knot at or before position i
+    const int nu = p - (before[p] - before[0]);  // new knots in the window
+    const double* left = tau.at(q + 1);
+    const double* right = tau.at(q + 1 + p - nu);
+    row[0] = 1;
+    int d = 0;
+    for (int k = 1; d < nu; ++k) {
+      if (before[k] == before[k - 1]) discrete_step(left, right, t[i + k], ++d, row.data());
+    }
+    A.set_row(i, q - nu, row.data(), nu + 1);
+  }
+  return A;
+}
+
+CompactRows refinement_matrix_boehm(const KnotVector& coarse, const KnotVector& fine) {
+  EXPECTS(is_refinement(coarse, fine));
+  const int p = coarse.degree();
+  const int n = coarse.control_point_count();
+  std::vector<double> added;
+  std::set_difference(fine.knots().begin(), fine.knots().end(), coarse.knots().begin(),
+                      coarse.knots().end(), std::back_inserter(added));
+
+  std::vector<Eigen::RowVectorXd> rows;
+  for (int i = 0; i < n; ++i) rows.push_back(Eigen::RowVectorXd::Unit(n, i));
+  std::vector<double> U = coarse.knots();
+  for (const double z : added) {
+    // The new knot goes behind its equals: U(mu) <= z < U(mu + 1), or to the very end.
+    const int mu = static_cast<int>(std::upper_bound(U.begin(), U.end(), z) - U.begin()) - 1;
+    std::vector<Eigen::RowVectorXd> next;
+    const int count = static_cast<int>(rows.size());
+    for (int i = 0; i <= count; ++i) {
+      const auto old = [&](int k) -> Eigen::RowVectorXd {
+        return k >= 0 && k < count ? rows[static_cast<std::size_t>(k)]
+                                   : Eigen::RowVectorXd::Zero(n);
+      };
+      if (i <= mu - p) {
+        next.push_back(old(i));
+      } else if (i > mu) {
+        next.push_back(old(i - 1));
+      } else {
+        const auto knot = [&](int k) { return U[static_cast<std::size_t>(k)]; };
+        const int high = std::min(i + p, static_cast<int>(U.size()) - 1);
+        const double share = (z - knot(i)) / (knot(high) - knot(i));
+        next.push_back((1 - share) * old(i - 1) + share * old(i));
+      }
+    }
+    rows = std::move(next);
+    U.insert(U.begin() + mu + 1, z);
+  }
+
+  CompactRows A(fine.control_point_count(), n, p + 1);
+  for (int i = 0; i < A.rows(); ++i) {
+    const Eigen::RowVectorXd& row = rows[static_cast<std::size_t>(i)];
+    int first = 0;
+    while (first < n - 1 && row(first) == 0) ++first;
+    int last = n - 1;
+    while (last > first && row(last) == 0) --last;
+    A.set_row(i, first, row.data() + first, last - first + 1);
+  }
+  return A;
+}
+
+template <int D>
+BSplineCurve<D> refine(const BSplineCurve<D>& curve, const KnotVector& fine) {
+  const CompactRows A = refinement_matrix(curve.knots(), fine);
+  return BSplineCurve<D>(fine, A.apply<D>(curve.control_points()));
+}
+
+template <int D>
+BSplineSurface<D> transform_u(const BSplineSurface<D>& surface, const CompactRows& A,
+                              KnotVector u) {
+  EXPECTS(A.columns() == surface.u_count() && A.rows() == u.control_point_count());
+  const Eigen::Index stride = static_cast<Eigen::Index>(D) * surface.v_count();
+  typename BSplineSurface<D>::ControlPoints points(
+      D, static_cast<Eigen::Index>(A.rows()) * surface.v_count());
+  A.apply_blocks(surface.control_points().data(), stride, points.data());
+  return BSplineSurface<D>(std::move(u), surface.v(), std::move(points));
+}
+
+template <int D>
+BSplineSurface<D> transform_v(const BSplineSurface<D>& surface, const CompactRows& A,
+                              KnotVector v) {
+  EXPECTS(A.columns() == surface.v_count() && A.rows() == v.control_point_count());
+  typename BSplineSurface<D>::ControlPoints points(
+      D, static_cast<Eigen::Index>(surface.u_count()) * A.rows());
+  for (int i = 0; i < surface.u_count(); ++i) {
+    const double* in = surface.control_points().data() + D * surface.index(i, 0);
+    A.apply_blocks(in, D, points.data() + static_cast<Eigen::Index>(D) * i * A.rows());
+  }
+  return BSplineSurface<D>(surface.u(), std::move(v), std::move(points));
+}
+
+// v first: its short blocks are cheap on the coarse net, and u then runs over long contiguous rows.
+template <int D>
+BSplineSurface<D> refine(const BSplineSurface<D>& surface, const KnotVector& fine_u,
+                         const KnotVector& fine_v) {
+  const CompactRows Av = refinement_matrix(surface.v(), fine_v);
+  const CompactRows Au = refinement_matrix(surface.u(), fine_u);
+  return transform_u(transform_v(surface, Av, fine_v), Au, fine_u);
+}
+
+template <int D>
+Result<BSplineCurve<D>> insert_knots(const BSplineCurve<D>& curve, std::vector<double> added) {
+  const Result<KnotVector> fine = with_knots(curve.knots(), std::move(added));
+  if (!fine) return fail(fine.error());
+  return refine(curve, *fine);
+}
+
+#define ANGIOSPLINE_INSTANTIATE(D)                                                     \
+  template BSplineCurve<D> refine(const BSplineCurve<D>&, const KnotVector&);          \
+  template BSplineSurface<D> refine(const BSplineSurface<D>&, const KnotVector&,       \
+                                    const KnotVector&);                                \
+  template BSplineSurface<D> transform_u(const BSplineSurface<D>&, const CompactRows&, \
+                                         KnotVector);                                  \
+  template BSplineSurface<D> transform_v(const BSplineSurface<D>&, const CompactRows&, \
+                                         KnotVector);                                  \
+  template Result<BSplineCurve<D>> insert_knots(const BSplineCurve<D>&, std::vector<double>);
+ANGIOSPLINE_INSTANTIATE(1)
+ANGIOSPLINE_INSTANTIATE(2)
+ANGIOSPLINE_INSTANTIATE(3)
+ANGIOSPLINE_INSTANTIATE(4)
+#undef ANGIOSPLINE_INSTANTIATE
+
+}  // namespace angiospline
