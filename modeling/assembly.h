@@ -1,0 +1,44 @@
+// Junctions and bodies put together: one pool of control points, joins, rims and names.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "modeling/body.h"
+#include "modeling/junction.h"
+#include "modeling/surface_network.h"
+
+namespace angiospline {
+
+// What lies beyond an end of a body: an opening of a junction, a circle shared with another body
+// (a closed ring is two bodies on two circles), or nothing: a rim.
+struct BodyLink {
+  enum class Kind { kRim, kOpening, kCircle };
+  Kind kind = Kind::kRim;
+  int junction = -1;  // kOpening: index into the junctions, and the opening's number there
+  int opening = -1;
+  int circle = -1;  // kCircle: bodies with the same number share it, one's end and one's start
+  std::string rim_name;
+  RimKind rim_kind = RimKind::kCap;
+};
+
+struct BodyPiece {
+  Body body;
+  std::string name;        // of its region: "wall_<branch>"; pieces with one name share a region
+  double radius_mm = 0.0;  // the smallest on the piece
+  BodyEnd start;           // as given to make_body; for a rim: the circle of the cap
+  BodyEnd end;
+  BodyLink start_link;
+  BodyLink end_link;
+};
+
+// The end of a body at a junction's opening. `leaving`: the body starts there.
+BodyEnd opening_end(const Junction& junction, int opening, bool leaving);
+
+// The network of all pieces; regions come in the order of junctions, then bodies. Where a strip
+// covers a whole arc of an opening it uses the junction's pool columns; where it covers a part, its
+// columns are Dependencies of them. Linear in the pieces' size.
+SurfaceNetwork assemble(const std::vector<Junction>& junctions,
+                        const std::vector<BodyPiece>& bodies);
+
+}  // namespace angiospline
