@@ -1,9 +1,11 @@
 // A model: the surfaces, the tree they came from, and what a reader of the file should know.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "base/result.h"
 #include "modeling/centerline_tree.h"
 #include "modeling/surface_network.h"
 
@@ -24,5 +26,10 @@ struct Model {
   std::vector<std::string> warnings;
   std::vector<FailedPart> failed;
 };
+
+// The first broken invariant of the tree or of the network: nodes in range, at least two finite
+// points a branch with a positive radius each, and find_defect(network). An empty tree is legal.
+std::optional<Error> find_defect(const CenterlineTree& tree);
+std::optional<Error> find_defect(const Model& model);
 
 }  // namespace angiospline

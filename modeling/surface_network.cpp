@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace angiospline {
 namespace {
@@ -35,8 +36,7 @@ std::optional<Error> find_patch_defect(const SurfaceNetwork& network, int number
     return defect("patch has no region", where, std::to_string(patch.region),
                   "a patch belongs to one region");
   }
-  const auto wanted =
-      index(patch.u.control_point_count()) * index(patch.v.control_point_count());
+  const auto wanted = index(patch.u.control_point_count()) * index(patch.v.control_point_count());
   if (patch.control.size() != wanted) {
     return defect("wrong number of control points", where, std::to_string(patch.control.size()),
                   std::to_string(wanted) + " are needed");
@@ -76,7 +76,8 @@ std::optional<Error> find_cover_defect(const SurfaceNetwork& network, int number
   static constexpr std::array<const char*, 4> kNames{"u0", "u1", "v0", "v1"};
   return defect("side is not covered exactly once by joins and rims",
                 patch_name(network, number) + ", side " + kNames[index(side)],
-                std::to_string(uses.size()) + " uses", "every part of a side is in one join or rim");
+                std::to_string(uses.size()) + " uses",
+                "every part of a side is in one join or rim");
 }
 
 std::optional<Error> find_rim_defect(const SurfaceNetwork& network, const Rim& rim) {
@@ -99,6 +100,49 @@ std::optional<Error> find_rim_defect(const SurfaceNetwork& network, const Rim& r
   }
   return defect("rim is not a closed chain", rim.name, std::to_string(rim.sides.size()) + " sides",
                 "sides follow each other head to tail");
+}
+
+std::optional<Error> find_rim_frame_defect(const Rim& rim) {
+  if (rim.name.empty()) return defect("rim has no name", "network", {}, "rims are named");
+  if (!rim.center_mm.allFinite()) {
+    return defect("rim's centre is not finite", rim.name, {}, "coordinates are finite");
+  }
+  if (!(std::abs(rim.normal.norm() - 1) <= 1e-6)) {
+    return defect("rim's normal is not a unit vector", rim.name, std::to_string(rim.normal.norm()),
+                  "normals have length 1");
+  }
+  if (!(rim.radius_mm > 0) || !std::isfinite(rim.radius_mm)) {
+    return defect("rim's radius is not positive", rim.name, std::to_string(rim.radius_mm),
+                  "radii are positive and finite");
+  }
+  return std::nullopt;
+}
+
+std::optional<Error> find_dependency_defect(const SurfaceNetwork& network) {
+  const auto count = static_cast<std::size_t>(network.control_points_mm.cols());
+  std::vector<char> dependent(count, 0);
+  const auto in_pool = [&](int point) { return point >= 0 && index(point) < count; };
+  for (std::size_t d = 0; d < network.dependencies.size(); ++d) {
+    const int point = network.dependencies[d].point;
+    const std::string where = "dependency " + std::to_string(d);
+    if (!in_pool(point)) {
+      return defect("dependent point outside the pool", where, std::to_string(point), {});
+    }
+    if (dependent[index(point)] != 0) {
+      return defect("point depends twice", where, std::to_string(point), "one dependency a point");
+    }
+    dependent[index(point)] = 1;
+  }
+  for (std::size_t d = 0; d < network.dependencies.size(); ++d) {
+    for (const auto& [master, weight] : network.dependencies[d].masters) {
+      if (!in_pool(master) || dependent[index(master)] != 0 || !std::isfinite(weight)) {
+        return defect("master is not a free point with a finite weight",
+                      "dependency " + std::to_string(d), std::to_string(master),
+                      "masters are never dependent themselves");
+      }
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -165,10 +209,14 @@ double join_parameter_b(const Join& join, double s) {
 
 Vec2 side_parameters(const Patch& patch, PatchSide side, double t) {
   switch (side) {
-    case PatchSide::kU0: return {patch.u.first(), t};
-    case PatchSide::kU1: return {patch.u.last(), t};
-    case PatchSide::kV0: return {t, patch.v.first()};
-    case PatchSide::kV1: break;
+    case PatchSide::kU0:
+      return {patch.u.first(), t};
+    case PatchSide::kU1:
+      return {patch.u.last(), t};
+    case PatchSide::kV0:
+      return {t, patch.v.first()};
+    case PatchSide::kV1:
+      break;
   }
   return {t, patch.v.last()};
 }
@@ -181,7 +229,12 @@ std::optional<Error> find_defect(const SurfaceNetwork& network) {
     }
   }
   for (const Region& region : network.regions) {
-    if (region.name.empty()) return defect("region has no name", "network", {}, "regions are named");
+    if (region.name.empty())
+      return defect("region has no name", "network", {}, "regions are named");
+    if (!(region.radius_mm >= 0) || !std::isfinite(region.radius_mm)) {
+      return defect("region's radius is negative or not finite", region.name,
+                    std::to_string(region.radius_mm), "radii are finite; 0 is unknown");
+    }
   }
   for (std::size_t p = 0; p < network.patches.size(); ++p) {
     if (auto error = find_patch_defect(network, static_cast<int>(p))) return error;
@@ -204,15 +257,17 @@ std::optional<Error> find_defect(const SurfaceNetwork& network) {
   }
   for (std::size_t p = 0; p < uses.size(); ++p) {
     for (int side = 0; side < 4; ++side) {
-      if (auto error = find_cover_defect(network, static_cast<int>(p), side, uses[p][index(side)])) {
+      if (auto error =
+              find_cover_defect(network, static_cast<int>(p), side, uses[p][index(side)])) {
         return error;
       }
     }
   }
   for (const Rim& rim : network.rims) {
+    if (auto error = find_rim_frame_defect(rim)) return error;
     if (auto error = find_rim_defect(network, rim)) return error;
   }
-  return std::nullopt;
+  return find_dependency_defect(network);
 }
 
 }  // namespace angiospline

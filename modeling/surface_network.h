@@ -24,7 +24,7 @@ struct Patch {
 // A named part of the wall: all patches of one branch's body or of one junction.
 enum class RegionKind { kBody, kJunction };
 struct Region {
-  std::string name;        // face name: "wall_<branch>" or "junction_<node>"
+  std::string name;  // face name: "wall_<branch>" or "junction_<node>"
   RegionKind kind = RegionKind::kBody;
   double radius_mm = 0.0;  // the smallest vessel radius in the region
 };
@@ -65,7 +65,7 @@ struct Rim {
   Vec3 center_mm = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  // unit, out of the vessel
   double radius_mm = 0.0;
-  std::vector<Side> sides;     // head to tail, around the opening
+  std::vector<Side> sides;  // head to tail, around the opening
 };
 
 struct SurfaceNetwork {
@@ -91,15 +91,16 @@ AppendOffsets append(SurfaceNetwork& network, const SurfaceNetwork& part);
 // Writes each dependent column as the combination of its masters.
 void apply_dependencies(SurfaceNetwork& network);
 
-// The parameter at which a point of `join` on side a, at fraction s in [0, 1] of its interval, lies;
-// and the (u, v) of a side's parameter.
+// The parameter at which a point of `join` on side a, at fraction s in [0, 1] of its interval,
+// lies; and the (u, v) of a side's parameter.
 double join_parameter_a(const Join& join, double s);
 double join_parameter_b(const Join& join, double s);
 Vec2 side_parameters(const Patch& patch, PatchSide side, double t);
 
 // The first broken invariant, or nothing: control indices in range and of the right count, knots
-// clamped, regions named, every part of every side in exactly one join or rim, rims closed chains.
-// The error names patch, side or rim. O(size).
+// clamped, coordinates finite, regions named, every part of every side in exactly one join or rim,
+// rims closed chains with a name, a unit normal and a radius, dependencies on free points. The
+// error names patch, side or rim. O(size).
 std::optional<Error> find_defect(const SurfaceNetwork& network);
 
 }  // namespace angiospline
