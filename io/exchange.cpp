@@ -1,0 +1,263 @@
+#include "io/exchange.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+
+#include <BRepBndLib.hxx>
+#include <BRep_Builder.hxx>
+#include <BRep_Tool.hxx>
+#include <Bnd_Box.hxx>
+#include <Geom_Surface.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <Message_Printer.hxx>
+#include <Message_ProgressScope.hxx>
+#include <Precision.hxx>
+#include <Quantity_Color.hxx>
+#include <TDF_ChildIterator.hxx>
+#include <TDF_LabelSequence.hxx>
+#include <TDataStd_Name.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Compound.hxx>
+#include <XCAFApp_Application.hxx>
+#include <XCAFDoc_ColorTool.hxx>
+#include <XCAFDoc_DocumentTool.hxx>
+#include <XCAFDoc_ShapeTool.hxx>
+
+#include "modeling/solid_shape.h"
+
+namespace angiospline {
+namespace {
+
+TCollection_ExtendedString extended(const std::string& text) {
+  return TCollection_ExtendedString(text.c_str(), true);
+}
+
+std::string plain(const TCollection_ExtendedString& text) {
+  std::string result(static_cast<std::size_t>(text.LengthOfCString()), '\0');
+  Standard_PCharacter data = result.data();
+  text.ToUTF8CString(data);
+  return result;
+}
+
+Quantity_Color occt_colour(const Vec3& c) {
+  return Quantity_Color(c.x(), c.y(), c.z(), Quantity_TOC_sRGB);
+}
+
+// Names and colours by the face's geometry, whatever its place in an assembly.
+struct FaceNote {
+  std::optional<std::string> name;
+  std::optional<Vec3> colour;
+};
+using FaceNotes = std::unordered_map<const TopoDS_TShape*, FaceNote>;
+
+void collect_notes(const TDF_Label& label, XCAFDoc_ColorTool& colours, FaceNotes& notes) {
+  const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(label);
+  if (shape.IsNull()) return;
+  FaceNote note;
+  Handle(TDataStd_Name) name;
+  const bool is_face = shape.ShapeType() == TopAbs_FACE;
+  if (is_face && label.FindAttribute(TDataStd_Name::GetID(), name)) {
+    note.name = plain(name->Get());
+  }
+  Quantity_Color colour;
+  if (colours.GetColor(label, XCAFDoc_ColorSurf, colour) ||
+      colours.GetColor(label, XCAFDoc_ColorGen, colour)) {
+    Standard_Real r = 0, g = 0, b = 0;
+    colour.Values(r, g, b, Quantity_TOC_sRGB);
+    note.colour = Vec3(r, g, b);
+  }
+  if (!note.name && !note.colour) return;
+  for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {
+    FaceNote& kept = notes[at.Current().TShape().get()];
+    if (is_face && note.name) kept.name = note.name;
+    // A face's own colour is stronger than its solid's.
+    if (note.colour && (is_face || !kept.colour)) kept.colour = note.colour;
+  }
+}
+
+int count(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
+  int n = 0;
+  for (TopExp_Explorer at(shape, kind); at.More(); at.Next()) ++n;
+  return n;
+}
+
+// Largest distance between two surfaces at the same fractions of their domains; nothing for a
+// plane, whose domain is endless.
+std::optional<double> surface_distance(const Geom_Surface& a, const Geom_Surface& b) {
+  const auto domain = [](const Geom_Surface& s) {
+    std::array<double, 4> d{};
+    s.Bounds(d[0], d[1], d[2], d[3]);
+    return d;
+  };
+  const std::array<double, 4> da = domain(a);
+  const std::array<double, 4> db = domain(b);
+  if (Precision::IsInfinite(da[0]) || Precision::IsInfinite(db[0])) return std::nullopt;
+  constexpr int kSteps = 6;
+  double largest = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int j = 0; j <= kSteps; ++j) {
+      const auto at = [&](const Geom_Surface& s, const std::array<double, 4>& d) {
+        return s.Value(d[0] + (d[1] - d[0]) * i / kSteps, d[2] + (d[3] - d[2]) * j / kSteps);
+      };
+      const double distance = at(a, da).Distance(at(b, db));
+      if (!std::isfinite(distance)) return std::numeric_limits<double>::infinity();
+      largest = std::max(largest, distance);
+    }
+  }
+  return largest;
+}
+
+tl::unexpected<Error> differs(const std::filesystem::path& path, std::string what,
+                              std::string value, std::string rule) {
+  return fail(
+      {ErrorKind::kCannotWrite, std::move(what), path.string(), std::move(value), std::move(rule)});
+}
+
+}  // namespace
+
+std::unique_lock<std::mutex> lock_exchange() {
+  static std::mutex mutex;
+  std::unique_lock<std::mutex> lock(mutex);
+  static const bool silent = [] {
+    Message::DefaultMessenger()->RemovePrinters(STANDARD_TYPE(Message_Printer));
+    return true;
+  }();
+  static_cast<void>(silent);
+  return lock;
+}
+
+Handle(TDocStd_Document) empty_document() {
+  Handle(TDocStd_Document) document;
+  XCAFApp_Application::GetApplication()->NewDocument("MDTV-XCAF", document);
+  return document;
+}
+
+Handle(TDocStd_Document) document_of(const Solid& solid, const std::string& product) {
+  Handle(TDocStd_Document) document = empty_document();
+  const Handle(XCAFDoc_ShapeTool) shapes = XCAFDoc_DocumentTool::ShapeTool(document->Main());
+  const Handle(XCAFDoc_ColorTool) colours = XCAFDoc_DocumentTool::ColorTool(document->Main());
+  const TDF_Label label = shapes->AddShape(solid.shape->shape, false);
+  TDataStd_Name::Set(label, extended(product));
+  std::size_t k = 0;
+  for (TopExp_Explorer at(solid.shape->shape, TopAbs_FACE); at.More(); at.Next(), ++k) {
+    const TDF_Label face = shapes->AddSubShape(label, at.Current());
+    if (face.IsNull()) continue;
+    TDataStd_Name::Set(face, extended(solid.faces[k].name));
+    colours->SetColor(face, occt_colour(solid.faces[k].colour), XCAFDoc_ColorSurf);
+  }
+  return document;
+}
+
+Result<Solid> solid_of(const Handle(TDocStd_Document) & document,
+                       const std::filesystem::path& path) {
+  const Handle(XCAFDoc_ShapeTool) shapes = XCAFDoc_DocumentTool::ShapeTool(document->Main());
+  const Handle(XCAFDoc_ColorTool) colours = XCAFDoc_DocumentTool::ColorTool(document->Main());
+  TDF_LabelSequence free;
+  shapes->GetFreeShapes(free);
+  TopoDS_Shape shape;
+  if (free.Length() == 1) {
+    shape = XCAFDoc_ShapeTool::GetShape(free.First());
+  } else {
+    TopoDS_Compound compound;
+    BRep_Builder builder;
+    builder.MakeCompound(compound);
+    for (const TDF_Label& label : free) builder.Add(compound, XCAFDoc_ShapeTool::GetShape(label));
+    shape = compound;
+  }
+  FaceNotes notes;
+  TDF_LabelSequence all;
+  shapes->GetShapes(all);
+  for (const TDF_Label& label : all) {
+    collect_notes(label, *colours, notes);
+    for (TDF_ChildIterator child(label); child.More(); child.Next()) {
+      collect_notes(child.Value(), *colours, notes);
+    }
+  }
+  std::vector<SolidFace> faces;
+  if (!shape.IsNull()) {
+    for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {
+      const auto note = notes.find(at.Current().TShape().get());
+      SolidFace face;
+      face.name = note != notes.end() && note->second.name && !note->second.name->empty()
+                      ? *note->second.name
+                      : "face_" + std::to_string(faces.size() + 1);
+      face.kind = kind_of_name(face.name);
+      face.colour = note != notes.end() && note->second.colour ? *note->second.colour
+                                                               : face_colour(face.kind, face.name);
+      faces.push_back(std::move(face));
+    }
+  }
+  if (faces.empty()) {
+    return fail({ErrorKind::kBadInput,
+                 "holds no face",
+                 path.string(),
+                 {},
+                 "a model has at least one surface"});
+  }
+  return make_solid_value(shape, std::move(faces));
+}
+
+Result<void> expect_same(const Solid& written, const Solid& read,
+                         const std::filesystem::path& path) {
+  const TopoDS_Shape& a = written.shape->shape;
+  const TopoDS_Shape& b = read.shape->shape;
+  const std::string rule = "the file must hold what was written";
+  for (const auto& [kind, name] : {std::pair{TopAbs_SOLID, "solids"}, {TopAbs_SHELL, "shells"}}) {
+    if (count(a, kind) == count(b, kind)) continue;
+    return differs(path, std::string("other number of ") + name + " read back",
+                   std::to_string(count(b, kind)), rule);
+  }
+  if (written.faces.size() != read.faces.size()) {
+    return differs(path, "other number of faces read back", std::to_string(read.faces.size()),
+                   rule);
+  }
+  Bnd_Box box;
+  BRepBndLib::AddClose(a, box);
+  const double size = std::sqrt(box.SquareExtent());
+  TopExp_Explorer at_a(a, TopAbs_FACE), at_b(b, TopAbs_FACE);
+  for (std::size_t k = 0; k < written.faces.size(); ++k, at_a.Next(), at_b.Next()) {
+    if (written.faces[k].name != read.faces[k].name) {
+      return differs(path, "face name did not survive: " + written.faces[k].name,
+                     read.faces[k].name, rule);
+    }
+    if (at_a.Current().Orientation() != at_b.Current().Orientation()) {
+      return differs(path, "face is inside out", written.faces[k].name, rule);
+    }
+    const auto distance = surface_distance(*BRep_Tool::Surface(TopoDS::Face(at_a.Current())),
+                                           *BRep_Tool::Surface(TopoDS::Face(at_b.Current())));
+    if (distance && !(*distance <= 1e-9 * size)) {
+      return differs(path, "surface moved: " + written.faces[k].name,
+                     std::to_string(*distance) + " mm", rule);
+    }
+  }
+  for (TopExp_Explorer at(b, TopAbs_SHELL); at.More(); at.Next()) {
+    if (BRep_Tool::IsClosed(at.Current())) continue;
+    return differs(path, "shell is open after reading back", {}, rule);
+  }
+  return {};
+}
+
+Result<void> expect_readable(const std::filesystem::path& path) {
+  std::error_code ec;
+  const auto bad = [&](std::string what) {
+    return fail({ErrorKind::kBadInput, std::move(what), path.string(), {}, {}});
+  };
+  const std::filesystem::file_status status = std::filesystem::status(path, ec);
+  if (!std::filesystem::exists(status)) return bad("no such file");
+  if (std::filesystem::is_directory(status)) return bad("is a folder, not a file");
+  if (std::filesystem::is_regular_file(status) && std::filesystem::file_size(path, ec) == 0) {
+    return bad("is empty");
+  }
+  return {};
+}
+
+void ExchangeProgress::Show(const Message_ProgressScope&, Standard_Boolean) {
+  progress_.at(stage_, GetPosition());
+}
+
+}  // namespace angiospline

@@ -1,0 +1,58 @@
+// What STEP and IGES have in common: OpenCASCADE's document of shapes with names and colours.
+// Only the files of io that know OpenCASCADE include this header.
+#pragma once
+
+#include <filesystem>
+#include <mutex>
+#include <string>
+
+#include <Message_ProgressIndicator.hxx>
+#include <TDocStd_Document.hxx>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "modeling/solid.h"
+
+namespace angiospline {
+
+// OpenCASCADE's exchange settings are global to the process: every reader and writer holds this
+// lock, and its messages are kept off our streams.
+std::unique_lock<std::mutex> lock_exchange();
+
+// A new document with the solid under the product's name, and its faces' names and colours.
+Handle(TDocStd_Document) document_of(const Solid& solid, const std::string& product);
+
+// An empty document for a reader to fill.
+Handle(TDocStd_Document) empty_document();
+
+// All free shapes of the document as one value, with the names and colours of its faces; faces
+// without a name are called "face_<k>", counted from 1. Kinds come from the names.
+// Errors: there is no face in it; `path` says where.
+Result<Solid> solid_of(const Handle(TDocStd_Document) & document,
+                       const std::filesystem::path& path);
+
+// Nothing if `read` is what was written: solids, closed shells, faces in order with names and
+// kinds, the surfaces' bounding control points within 1e-6 of the model's size; otherwise what
+// differs.
+Result<void> expect_same(const Solid& written, const Solid& read,
+                         const std::filesystem::path& path);
+
+// Errors for a file that is not there, is a folder, or is empty.
+Result<void> expect_readable(const std::filesystem::path& path);
+
+// OpenCASCADE's progress, told to ours. Lives on the heap under a handle.
+class ExchangeProgress : public Message_ProgressIndicator {
+ public:
+  ExchangeProgress(const Progress& progress, std::string stage)
+      : progress_(progress), stage_(std::move(stage)) {}
+
+ protected:
+  void Show(const Message_ProgressScope& scope, Standard_Boolean force) override;
+  Standard_Boolean UserBreak() override { return progress_.should_stop(); }
+
+ private:
+  const Progress& progress_;
+  std::string stage_;
+};
+
+}  // namespace angiospline
