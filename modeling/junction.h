@@ -42,6 +42,8 @@ struct Junction {
   double worst_angle_deg = 0.0;           // between the normals of neighbouring patches
   double jacobian_ratio = 0.0;            // least |Su x Sv| over its mean on the same patch
   double curvature_times_radius = 0.0;    // largest curvature times the smallest branch radius
+  double distance_over_radius = 0.0;      // from the union of cylinders, over the smallest radius
+  bool fair = true;                       // curvature below 20 over, distance below half, the smallest radius
   int attempts = 1;                       // settings tried before one passed every gate
 };
 

@@ -1,0 +1,173 @@
+#include "modeling/junction_quality.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <Eigen/Dense>
+#include <fmt/core.h>
+
+#include "kernel/basis.h"
+#include "modeling/triangles_cross.h"
+
+namespace angiospline {
+namespace {
+
+constexpr int kGrid = 13;
+constexpr int kEdgeSamples = 33;
+constexpr int kSize = 6;
+constexpr int kPoints = 36;
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+constexpr double kWorstAngleDeg = 1e-3;
+constexpr double kLeastJacobianRatio = 0.03;
+constexpr double kMostOffTargetDeg = 60;
+constexpr double kFairCurvature = 20;
+constexpr double kFairDistance = 0.5;
+
+using PatchPoints = Eigen::Matrix<double, 3, kPoints>;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+struct Derivatives {
+  Vec3 s, su, sv, suu, suv, svv;
+};
+
+// Rows 0 to 2 of the quintic Bernstein basis and its derivatives at n equal steps over [0, 1].
+std::vector<Eigen::Matrix<double, 3, kSize>> basis_table(int count) {
+  const KnotVector knots = KnotVector::bezier(kSize - 1);
+  std::vector<Eigen::Matrix<double, 3, kSize>> table;
+  for (int k = 0; k < count; ++k) {
+    table.push_back(basis_at(knots, static_cast<double>(k) / (count - 1), 2).values);
+  }
+  return table;
+}
+
+Derivatives evaluate(const PatchPoints& P, const Eigen::Matrix<double, 3, kSize>& u,
+                     const Eigen::Matrix<double, 3, kSize>& v) {
+  Eigen::Matrix3d rows[3];  // derivative in v of order d, column per ... summed over u below
+  for (auto& m : rows) m.setZero();
+  for (int i = 0; i < kSize; ++i) {
+    const Eigen::Matrix3d line = P.middleCols<kSize>(i * kSize) * v.transpose();
+    rows[0] += u(0, i) * line;
+    rows[1] += u(1, i) * line;
+    rows[2] += u(2, i) * line;
+  }
+  return {rows[0].col(0), rows[1].col(0), rows[0].col(1),
+          rows[2].col(0), rows[1].col(1), rows[0].col(2)};
+}
+
+double largest_curvature(const Derivatives& d, const Vec3& n) {
+  const double E = d.su.squaredNorm(), F = d.su.dot(d.sv), G = d.sv.squaredNorm();
+  const double L = n.dot(d.suu), M = n.dot(d.suv), N = n.dot(d.svv);
+  const double area = E * G - F * F;
+  const double H = (E * N - 2 * F * M + G * L) / (2 * area);
+  const double K = (L * N - M * M) / area;
+  return std::abs(H) + std::sqrt(std::max(0.0, H * H - K));
+}
+
+double angle_deg(const Vec3& a, const Vec3& b) {
+  return kDegrees * std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+}  // namespace
+
+JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionTarget& target,
+                                 const JunctionNet& net) {
+  static const auto kGridBasis = basis_table(kGrid);
+  static const auto kEdgeBasis = basis_table(kEdgeSamples);
+  const int patches = static_cast<int>(topology.patches.size());
+  std::vector<PatchPoints> P(at(patches));
+  for (int p = 0; p < patches; ++p) {
+    for (int k = 0; k < kPoints; ++k) {
+      P[at(p)].col(k) = net.points.col(net.grid.at(p, k / kSize, k % kSize));
+    }
+  }
+  double smallest = target.branches().front().radius;
+  for (const TargetBranch& branch : target.branches()) smallest = std::min(smallest, branch.radius);
+
+  JunctionQuality q;
+  q.jacobian_ratio = 1;
+  bool star_shaped = true;
+  std::vector<Points3> grids;
+  for (int p = 0; p < patches; ++p) {
+    double least = std::numeric_limits<double>::infinity();
+    double sum = 0;
+    Points3 grid(3, kGrid * kGrid);
+    for (int i = 0; i < kGrid; ++i) {
+      for (int j = 0; j < kGrid; ++j) {
+        const Derivatives d = evaluate(P[at(p)], kGridBasis[at(i)], kGridBasis[at(j)]);
+        const Vec3 cross = d.su.cross(d.sv);
+        const double area = cross.norm();
+        const Vec3 n = cross / area;
+        const JunctionTarget::Foot foot = target.foot(d.s);
+        least = std::min(least, area);
+        sum += area;
+        grid.col(i * kGrid + j) = d.s;
+        q.normal_off_target_deg = std::max(q.normal_off_target_deg, angle_deg(n, foot.normal));
+        q.curvature_times_radius =
+            std::max(q.curvature_times_radius, smallest * largest_curvature(d, n));
+        q.distance_to_union =
+            std::max(q.distance_to_union, std::abs(target.union_distance(d.s)) / smallest);
+        star_shaped = star_shaped && d.s.dot(n) > 0;
+      }
+    }
+    q.jacobian_ratio = std::min(q.jacobian_ratio, least / (sum / (kGrid * kGrid)));
+    grids.push_back(std::move(grid));
+  }
+  const auto normal = [&](int p, int a, int b) {
+    const Derivatives d = evaluate(P[at(p)], kEdgeBasis[at(a)], kEdgeBasis[at(b)]);
+    return Vec3(d.su.cross(d.sv));
+  };
+  const int last = kEdgeSamples - 1;
+  for (int p = 0; p < patches; ++p) {
+    const int next = topology.patches[at(p)].next;
+    for (int k = 0; k <= last; ++k) {
+      q.worst_angle_deg =
+          std::max(q.worst_angle_deg, angle_deg(normal(p, k, last), normal(next, k, 0)));
+    }
+  }
+  for (const JunctionSaddle& s : topology.saddles) {
+    for (int k = 0; k <= last; ++k) {
+      q.worst_angle_deg = std::max(q.worst_angle_deg, angle_deg(normal(s.patch_a, last, k),
+                                                                normal(s.patch_b, last, last - k)));
+    }
+  }
+  // A closed surface seen from the centre without turning its back meets itself nowhere.
+  if (!star_shaped) q.self_intersecting = grids_cross(grids, kGrid);
+  // Comparisons with NaN are false: make every such figure fail its gate.
+  for (double* figure : {&q.worst_angle_deg, &q.normal_off_target_deg, &q.curvature_times_radius}) {
+    if (!std::isfinite(*figure)) *figure = 1e300;
+  }
+  if (!net.points.allFinite()) q.worst_angle_deg = 180;
+  return q;
+}
+
+bool is_sound(const JunctionQuality& q) { return failed_gate(q).empty(); }
+
+bool is_fair(const JunctionQuality& q) {
+  return is_sound(q) && q.curvature_times_radius < kFairCurvature &&
+         q.distance_to_union < kFairDistance;
+}
+
+std::string failed_gate(const JunctionQuality& q) {
+  if (!(q.jacobian_ratio > kLeastJacobianRatio)) {
+    return fmt::format("a patch is folded: Jacobian ratio {:.3g}, at least {} is wanted",
+                       q.jacobian_ratio, kLeastJacobianRatio);
+  }
+  if (!(q.normal_off_target_deg < kMostOffTargetDeg)) {
+    return fmt::format("a patch is turned {:.3g} degrees from its target, at most {} is allowed",
+                       q.normal_off_target_deg, kMostOffTargetDeg);
+  }
+  if (!(q.worst_angle_deg < kWorstAngleDeg)) {
+    return fmt::format(
+        "normals of neighbouring patches differ by {:.3g} degrees, at most {} is allowed",
+        q.worst_angle_deg, kWorstAngleDeg);
+  }
+  if (q.self_intersecting) return "the surface meets itself";
+  return {};
+}
+
+}  // namespace angiospline

@@ -1,0 +1,32 @@
+// Whether a junction's surface may be used: the figures behind the gates.
+#pragma once
+
+#include <string>
+
+#include "modeling/junction_target.h"
+#include "modeling/junction_topology.h"
+#include "modeling/junction_unknowns.h"
+
+namespace angiospline {
+
+struct JunctionQuality {
+  double worst_angle_deg = 0.0;  // between normals over all inner edges, 33 samples with corners
+  double jacobian_ratio = 0.0;   // least |Su x Sv| over its mean on the same patch
+  double normal_off_target_deg = 0.0;   // largest angle to the target's normal
+  double curvature_times_radius = 0.0;  // largest curvature times the smallest radius
+  double distance_to_union = 0.0;       // from the branches' cylinders, over the smallest radius
+  bool self_intersecting = false;
+};
+
+// Measures every patch on a grid of 13 x 13 parameters, ends included.
+JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionTarget& target,
+                                 const JunctionNet& net);
+
+// Limits of what is usable at all, and of what is also a fair surface.
+bool is_sound(const JunctionQuality& quality);
+bool is_fair(const JunctionQuality& quality);
+
+// The first gate the surface does not pass, with value and limit; empty when it is sound.
+std::string failed_gate(const JunctionQuality& quality);
+
+}  // namespace angiospline

@@ -1,0 +1,130 @@
+#include <algorithm>
+#include <array>
+#include <numbers>
+#include <optional>
+
+#include <Eigen/Geometry>
+#include <fmt/core.h>
+
+#include "modeling/junction.h"
+#include "modeling/junction_layout.h"
+#include "modeling/junction_quality.h"
+#include "modeling/junction_target.h"
+#include "modeling/junction_topology.h"
+#include "modeling/plan_openings.h"
+#include "modeling/smooth_junction.h"
+
+namespace angiospline {
+namespace {
+
+// One set of choices; blends are relative to the one asked for.
+struct Setting {
+  double blend = 1.0;
+  double growth = 0.0;
+  int layout_roots = 3;
+  double merge_deg = 5.0;
+};
+
+constexpr std::array<Setting, 6> kLadder{{{1.0, 0.0, 3, 5.0},
+                                          {1.0, 0.3, 3, 5.0},
+                                          {1.3, 0.3, 2, 5.0},
+                                          {0.8, 0.0, 2, 10.0},
+                                          {1.3, 0.0, 3, 2.0},
+                                          {0.6, 0.3, 3, 5.0}}};
+
+struct Attempt {
+  JunctionTopology topology;
+  JunctionLayout layout;
+  JunctionNet net;
+  JunctionQuality quality;
+};
+
+Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
+  std::vector<Vec3> directions;
+  for (const TargetBranch& b : plan.branches) directions.push_back(b.direction);
+  JunctionTopology topology =
+      junction_topology(directions, setting.merge_deg * std::numbers::pi / 180);
+  const JunctionTarget target(plan.branches, setting.blend * plan.blend, setting.growth);
+  LayoutOptions layout_options;
+  layout_options.sqrt_count = setting.layout_roots;
+  const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
+  SmoothedNet smooth = smooth_junction(topology, target, layout);
+  JunctionQuality quality = junction_quality(topology, target, smooth.net);
+  return {std::move(topology), layout, std::move(smooth.net), quality};
+}
+
+SurfaceNetwork make_network(const JunctionSpec& spec, const OpeningPlan& plan,
+                            const JunctionTopology& topology, const JunctionNet& net) {
+  SurfaceNetwork network;
+  network.control_points_mm = (plan.unit_mm * net.points).colwise() + spec.center_mm;
+  double smallest = spec.branches.front().radius_mm;
+  for (const JunctionBranch& b : spec.branches) smallest = std::min(smallest, b.radius_mm);
+  network.regions.push_back({"junction_" + spec.name, RegionKind::kJunction, smallest});
+  const KnotVector knots = KnotVector::bezier(5);
+  const SharedGrid grid(topology, 6);
+  for (int p = 0; p < static_cast<int>(topology.patches.size()); ++p) {
+    Patch patch{knots, knots, {}, 0};
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) patch.control.push_back(grid.at(p, i, j));
+    }
+    network.patches.push_back(std::move(patch));
+    const int next = topology.patches[static_cast<std::size_t>(p)].next;
+    network.joins.push_back({{p, PatchSide::kV1}, {next, PatchSide::kV0}, false});
+  }
+  for (const JunctionSaddle& s : topology.saddles) {
+    network.joins.push_back({{s.patch_a, PatchSide::kU1}, {s.patch_b, PatchSide::kU1}, true});
+  }
+  return network;
+}
+
+Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const Attempt& best,
+                     int attempts) {
+  Junction junction;
+  junction.network = make_network(spec, plan, best.topology, best.net);
+  for (std::size_t b = 0; b < spec.branches.size(); ++b) {
+    const OpeningFrame& frame = best.layout.openings[b];
+    JunctionOpening opening;
+    opening.axis = frame.axis;
+    opening.center_mm = spec.center_mm + plan.unit_mm * frame.center;
+    opening.radius_mm = spec.branches[b].radius_mm;
+    for (const double seam : frame.seams_rad) opening.seams.push_back(frame.direction(seam));
+    opening.patches = best.topology.sectors[b];
+    junction.openings.push_back(std::move(opening));
+  }
+  junction.worst_angle_deg = best.quality.worst_angle_deg;
+  junction.jacobian_ratio = best.quality.jacobian_ratio;
+  junction.curvature_times_radius = best.quality.curvature_times_radius;
+  junction.distance_over_radius = best.quality.distance_to_union;
+  junction.fair = is_fair(best.quality);
+  junction.attempts = attempts;
+  return junction;
+}
+
+}  // namespace
+
+Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options) {
+  const Result<OpeningPlan> plan = plan_openings(spec, options);
+  if (!plan) return fail(plan.error());
+  std::optional<Attempt> sound;
+  std::string why;
+  int attempts = 0;
+  for (const Setting& setting : kLadder) {
+    ++attempts;
+    Attempt now = attempt(*plan, setting);
+    if (is_fair(now.quality)) return make_result(spec, *plan, now, attempts);
+    if (is_sound(now.quality) &&
+        (!sound || now.quality.curvature_times_radius < sound->quality.curvature_times_radius)) {
+      sound = std::move(now);
+    } else if (why.empty()) {
+      why = failed_gate(now.quality);
+    }
+  }
+  if (sound) return make_result(spec, *plan, *sound, attempts);
+  std::string names;
+  for (const JunctionBranch& b : spec.branches) names += (names.empty() ? "" : ", ") + b.name;
+  return fail({ErrorKind::kFailed, "no setting gives a smooth junction",
+               "junction " + spec.name + " of " + names, why,
+               fmt::format("{} settings tried", attempts)});
+}
+
+}  // namespace angiospline

@@ -1,0 +1,151 @@
+#include "modeling/plan_openings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include <Eigen/Geometry>
+#include <fmt/core.h>
+
+namespace angiospline {
+namespace {
+
+constexpr double kLargestShare = 0.05;  // of the other branches at an opening's circle
+constexpr double kLeastMargin = 0.3;    // radii
+constexpr double kLeastAngleRad = 1.0 * std::numbers::pi / 180;
+constexpr double kUnitTolerance = 1e-6;  // of a direction's length
+constexpr int kCirclePoints = 24;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+std::string junction_name(const JunctionSpec& spec) {
+  return spec.name.empty() ? "junction" : "junction " + spec.name;
+}
+
+std::string branch_name(const JunctionSpec& spec, std::size_t b) {
+  return spec.branches[b].name.empty() ? fmt::format("branch {}", b) : spec.branches[b].name;
+}
+
+std::optional<Error> find_branch_defect(const JunctionSpec& spec, std::size_t b) {
+  const JunctionBranch& branch = spec.branches[b];
+  const std::string where = junction_name(spec) + ", " + branch_name(spec, b);
+  if (!std::isfinite(branch.radius_mm) || branch.radius_mm <= 0) {
+    return Error{ErrorKind::kBadInput, "radius is not positive", where,
+                 fmt::format("{}", branch.radius_mm), "radii are positive and finite"};
+  }
+  const double length = branch.direction.norm();
+  if (!(std::abs(length - 1) <= kUnitTolerance)) {
+    return Error{ErrorKind::kBadInput, "direction is not a unit vector", where,
+                 fmt::format("length {}", length), "directions have length 1"};
+  }
+  if (std::isnan(branch.longest_mm) || branch.longest_mm < 0) {
+    return Error{ErrorKind::kBadInput, "longest distance of an opening is negative", where,
+                 fmt::format("{}", branch.longest_mm), "zero or more, zero for no bound"};
+  }
+  return std::nullopt;
+}
+
+std::optional<Error> find_spec_defect(const JunctionSpec& spec) {
+  if (spec.branches.size() < 3) {
+    return Error{ErrorKind::kBadInput, "too few branches for a junction", junction_name(spec),
+                 fmt::format("{}", spec.branches.size()), "a junction has three or more"};
+  }
+  if (!spec.center_mm.allFinite()) {
+    return Error{ErrorKind::kBadInput, "centre is not finite", junction_name(spec), {}, {}};
+  }
+  for (std::size_t b = 0; b < spec.branches.size(); ++b) {
+    if (auto error = find_branch_defect(spec, b)) return error;
+  }
+  for (std::size_t a = 0; a < spec.branches.size(); ++a) {
+    for (std::size_t b = a + 1; b < spec.branches.size(); ++b) {
+      const Vec3& d = spec.branches[a].direction;
+      const Vec3& e = spec.branches[b].direction;
+      const double angle = std::atan2(d.cross(e).norm(), d.dot(e));
+      if (angle >= kLeastAngleRad) continue;
+      return Error{ErrorKind::kBadInput, "two branches in the same direction", junction_name(spec),
+                   fmt::format("{} and {}, {:.3g} degrees apart", branch_name(spec, a),
+                               branch_name(spec, b), angle * 180 / std::numbers::pi),
+                   "directions of a junction differ by a degree or more"};
+    }
+  }
+  return std::nullopt;
+}
+
+double share_around(const JunctionTarget& target, int b, double distance) {
+  const TargetBranch& branch = target.branches()[at(b)];
+  const Vec3 x = branch.direction.unitOrthogonal();
+  const Vec3 y = branch.direction.cross(x);
+  double worst = 0;
+  for (int k = 0; k < kCirclePoints; ++k) {
+    const double phi = 2 * std::numbers::pi * k / kCirclePoints;
+    const Vec3 p =
+        distance * branch.direction + branch.radius * (std::cos(phi) * x + std::sin(phi) * y);
+    worst = std::max(worst, target.others_share(b, p));
+  }
+  return worst;
+}
+
+// The least distance beyond which the others' share is small. Branches diverge, so the share falls
+// once it has begun to; the search comes inward from a distance at which it is certainly small.
+double blend_end(const JunctionTarget& target, int b) {
+  const TargetBranch& branch = target.branches()[at(b)];
+  double far = branch.radius;
+  while (share_around(target, b, far) > kLargestShare) far *= 2;
+  double near = 0;
+  if (far == branch.radius) return far;
+  near = far / 2;
+  for (int k = 0; k < 24; ++k) {
+    const double middle = (near + far) / 2;
+    (share_around(target, b, middle) > kLargestShare ? near : far) = middle;
+  }
+  return far;
+}
+
+}  // namespace
+
+Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOptions& options) {
+  if (auto error = find_spec_defect(spec)) return fail(*error);
+  OpeningPlan plan;
+  plan.unit_mm = 0;
+  for (const JunctionBranch& b : spec.branches) plan.unit_mm = std::max(plan.unit_mm, b.radius_mm);
+  for (const JunctionBranch& b : spec.branches) {
+    plan.branches.push_back({b.direction.normalized(), b.radius_mm / plan.unit_mm});
+  }
+  Error too_short;
+  for (const double part : {1.0, 0.75, 0.5, 1.0 / 3}) {
+    plan.blend = part * options.blend;
+    plan.distances.clear();
+    const JunctionTarget target(plan.branches, plan.blend, 0.0);
+    bool fits = true;
+    for (std::size_t b = 0; b < spec.branches.size() && fits; ++b) {
+      const double r = plan.branches[b].radius;
+      const double end = blend_end(target, static_cast<int>(b));
+      const double longest = spec.branches[b].longest_mm / plan.unit_mm;
+      double distance = end + options.margin * r;
+      if (longest > 0) distance = std::min(distance, longest);
+      if (distance < end + std::min(kLeastMargin, options.margin) * r) {
+        fits = false;
+        too_short = Error{
+            ErrorKind::kFailed, "branch is too short for its opening",
+            junction_name(spec) + ", " + branch_name(spec, b),
+            fmt::format("{:.4g} mm", spec.branches[b].longest_mm),
+            fmt::format("at least {:.4g} mm are needed", (end + kLeastMargin * r) * plan.unit_mm)};
+      }
+      plan.distances.push_back(distance);
+    }
+    if (fits) return plan;
+  }
+  return fail(too_short);
+}
+
+Result<std::vector<double>> opening_distances_mm(const JunctionSpec& spec,
+                                                 const JunctionOptions& options) {
+  const Result<OpeningPlan> plan = plan_openings(spec, options);
+  if (!plan) return fail(plan.error());
+  std::vector<double> distances;
+  for (const double d : plan->distances) distances.push_back(d * plan->unit_mm);
+  return distances;
+}
+
+}  // namespace angiospline

@@ -1,0 +1,26 @@
+// How far from its centre a junction ends along each branch.
+#pragma once
+
+#include <vector>
+
+#include "base/result.h"
+#include "modeling/junction.h"
+#include "modeling/junction_target.h"
+
+namespace angiospline {
+
+// Distances of the openings in units of `unit_mm`, and the blend they were found with (smaller than
+// the one asked for where a branch is short).
+struct OpeningPlan {
+  double unit_mm = 1.0;  // the largest radius: all later work is done in this unit
+  double blend = 0.0;
+  std::vector<TargetBranch> branches;
+  std::vector<double> distances;
+};
+
+// Where the other branches' share of the target falls to a twentieth all round the branch's circle,
+// plus a margin. Branches shorter than that first lose margin (down to 0.3 radii), then all
+// branches lose blend (down to a third). Errors: see opening_distances_mm in junction.h.
+Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOptions& options);
+
+}  // namespace angiospline

@@ -1,0 +1,170 @@
+#include "modeling/target_energy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernel/basis.h"
+
+namespace angiospline {
+namespace {
+
+constexpr int kSize = 6;
+constexpr int kPoints = kSize * kSize;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Sum over rows and columns of the squared second differences, as a 36 x 36 matrix.
+Eigen::MatrixXd second_difference_matrix() {
+  Eigen::MatrixXd R = Eigen::MatrixXd::Zero(kPoints, kPoints);
+  const auto add = [&](int a, int b, int c) {
+    Eigen::VectorXd d = Eigen::VectorXd::Zero(kPoints);
+    d(a) = d(c) = 1;
+    d(b) = -2;
+    R += d * d.transpose();
+  };
+  for (int i = 0; i < kSize; ++i) {
+    for (int j = 1; j + 1 < kSize; ++j) {
+      add(i * kSize + j - 1, i * kSize + j, i * kSize + j + 1);
+      add((j - 1) * kSize + i, j * kSize + i, (j + 1) * kSize + i);
+    }
+  }
+  return R;
+}
+
+}  // namespace
+
+TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarget& target,
+                           const JunctionLayout& layout, const JunctionNet& net)
+    : topology_(topology),
+      target_(target),
+      layout_(layout),
+      models_(topology.patches.size()),
+      roughness_(second_difference_matrix()) {
+  const int last = layout.grid.size() - 1;
+  const int samples = last * (last + 1);  // the opening's own row is fixed
+  const KnotVector knots = KnotVector::bezier(kSize - 1);
+  b_.resize(kPoints, samples);
+  bu_.resize(kPoints, samples);
+  bv_.resize(kPoints, samples);
+  sample_weights_.resize(samples);
+  for (int i = 1, s = 0; i <= last; ++i) {
+    const BasisValues u = basis_at(knots, static_cast<double>(i) / last, 1);
+    for (int j = 0; j <= last; ++j, ++s) {
+      const BasisValues v = basis_at(knots, static_cast<double>(j) / last, 1);
+      for (int a = 0; a < kSize; ++a) {
+        for (int c = 0; c < kSize; ++c) {
+          b_(a * kSize + c, s) = u.values(0, a) * v.values(0, c);
+          bu_(a * kSize + c, s) = u.values(1, a) * v.values(0, c);
+          bv_(a * kSize + c, s) = u.values(0, a) * v.values(1, c);
+        }
+      }
+      // Samples on edges belong to two patches.
+      sample_weights_(s) = (i == last ? 0.5 : 1.0) * (j == 0 || j == last ? 0.5 : 1.0);
+    }
+  }
+  for (int p = 0; p < patches(); ++p) {
+    const JunctionPatch& patch = topology.patches[at(p)];
+    const JunctionSaddle& saddle = topology.saddles[at(patch.saddle)];
+    const double own = layout.openings[at(patch.branch)].radius;
+    const int neighbour = saddle.patch_a == p ? saddle.branch_b : saddle.branch_a;
+    const double least = std::min(own, layout.openings[at(neighbour)].radius);
+    Eigen::VectorXd scale(samples);
+    for (int i = 1, s = 0; i <= last; ++i) {
+      for (int j = 0; j <= last; ++j, ++s) {
+        const double u = static_cast<double>(i) / last;
+        scale(s) = (1 - u) * own + u * least;
+      }
+    }
+    scales_.push_back(std::move(scale));
+    PatchModel& model = models_[at(p)];
+    for (int k = 0; k < kPoints; ++k) {
+      const ControlSlot& slot = net.slots[at(net.grid.at(p, k / kSize, k % kSize))];
+      for (int d = 0; d < slot.count; ++d) model.unknowns.push_back(slot.first + d);
+    }
+  }
+}
+
+void TargetEnergy::update(const JunctionNet& net, const EnergyWeights& weights) {
+  for (int p = 0; p < patches(); ++p) update_patch(p, net, weights);
+}
+
+void TargetEnergy::update_patch(int p, const JunctionNet& net, const EnergyWeights& weights) {
+  PatchModel& model = models_[at(p)];
+  const Eigen::Index count = static_cast<Eigen::Index>(model.unknowns.size());
+  const Eigen::Index samples = b_.cols();
+  Eigen::Matrix<double, 3, kPoints> P;
+  for (int k = 0; k < kPoints; ++k) P.col(k) = net.points.col(net.grid.at(p, k / kSize, k % kSize));
+  const Eigen::Matrix3Xd S = P * b_;
+  const Eigen::Matrix3Xd Su = P * bu_;
+  const Eigen::Matrix3Xd Sv = P * bv_;
+
+  // Rows along the target's normals: residuals and, scaled alike, their basis functions.
+  const int last = layout_.grid.size() - 1;
+  const Eigen::VectorXd& scale = scales_[at(p)];
+  Eigen::MatrixXd basis(kPoints, 3 * samples);
+  Eigen::Matrix3Xd normals(3, samples);
+  Eigen::Matrix3Xd anchors(3, samples);
+  Eigen::VectorXd residual(3 * samples);
+  Eigen::VectorXd anchor_weight(samples);
+  for (int s = 0; s < samples; ++s) {
+    const int node = layout_.grid.at(p, 1 + s / (last + 1), s % (last + 1));
+    anchors.col(s) = layout_.nodes.col(node);
+    const double w = std::sqrt(sample_weights_(s));
+    JunctionTarget::Foot foot{0, layout_.normals.col(node)};
+    if (weights.distance > 0) foot = target_.foot(S.col(s));
+    normals.col(s) = foot.normal;
+    const double on_distance = w * std::sqrt(weights.distance) / scale(s);
+    const double shortest = 0.05 * scale(s);
+    const double on_u = w * std::sqrt(weights.tangent) / std::max(Su.col(s).norm(), shortest);
+    const double on_v = w * std::sqrt(weights.tangent) / std::max(Sv.col(s).norm(), shortest);
+    basis.col(3 * s) = on_distance * b_.col(s);
+    basis.col(3 * s + 1) = on_u * bu_.col(s);
+    basis.col(3 * s + 2) = on_v * bv_.col(s);
+    residual(3 * s) = on_distance * foot.distance;
+    residual(3 * s + 1) = on_u * foot.normal.dot(Su.col(s));
+    residual(3 * s + 2) = on_v * foot.normal.dot(Sv.col(s));
+    anchor_weight(s) = weights.anchor * sample_weights_(s) / (scale(s) * scale(s));
+  }
+  Eigen::MatrixXd J(count, 3 * samples);
+  Eigen::Index row = 0;
+  std::array<Eigen::Index, kPoints> first{};
+  for (int k = 0; k < kPoints; ++k) {
+    const ControlSlot& slot = net.slots[at(net.grid.at(p, k / kSize, k % kSize))];
+    first[at(k)] = row;
+    for (int d = 0; d < slot.count; ++d, ++row) {
+      for (Eigen::Index s = 0; s < samples; ++s) {
+        const double n = slot.count == 3 ? normals(d, s) : normals.col(s).dot(slot.along);
+        J.block<1, 3>(row, 3 * s) = n * basis.block<1, 3>(k, 3 * s);
+      }
+    }
+  }
+  model.hessian.setZero(count, count);
+  model.hessian.selfadjointView<Eigen::Lower>().rankUpdate(J);
+  model.gradient = J * residual;
+
+  // The isotropic terms.
+  const double least = scale.minCoeff();
+  const Eigen::MatrixXd K = b_ * anchor_weight.asDiagonal() * b_.transpose() +
+                            weights.roughness / (least * least) * roughness_;
+  const Eigen::Matrix3Xd G = P * K - anchors * anchor_weight.asDiagonal() * b_.transpose();
+  for (int k = 0; k < kPoints; ++k) {
+    const ControlSlot& a = net.slots[at(net.grid.at(p, k / kSize, k % kSize))];
+    for (int d = 0; d < a.count; ++d) {
+      model.gradient(first[at(k)] + d) += a.count == 3 ? G(d, k) : a.along.dot(G.col(k));
+    }
+    for (int l = 0; l <= k; ++l) {
+      const ControlSlot& b = net.slots[at(net.grid.at(p, l / kSize, l % kSize))];
+      for (int d = 0; d < a.count; ++d) {
+        const Vec3 da = a.count == 3 ? Vec3::Unit(d) : a.along;
+        for (int e = 0; e < b.count; ++e) {
+          const Vec3 db = b.count == 3 ? Vec3::Unit(e) : b.along;
+          if (first[at(l)] + e <= first[at(k)] + d) {
+            model.hessian(first[at(k)] + d, first[at(l)] + e) += K(k, l) * da.dot(db);
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace angiospline

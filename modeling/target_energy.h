@@ -1,0 +1,61 @@
+// How far a junction's patches are from their target: the quadratic model of each Gauss-Newton
+// step.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "modeling/junction_layout.h"
+#include "modeling/junction_target.h"
+#include "modeling/junction_topology.h"
+#include "modeling/junction_unknowns.h"
+
+namespace angiospline {
+
+// Weights of the squared terms at each sample; lengths in local radii.
+struct EnergyWeights {
+  double distance = 10.0;    // from the target
+  double tangent = 1.0;      // sines between Su, Sv and the target's tangent plane
+  double anchor = 0.01;      // from the layout's node of the same parameters
+  double roughness = 0.003;  // second differences of the control net
+};
+
+// Weights for fitting the layout itself.
+inline constexpr EnergyWeights kFitWeights{0.0, 0.1, 1.0, 0.001};
+
+// The unknowns a patch depends on, and its share of the Hessian (lower triangle) and gradient.
+struct PatchModel {
+  std::vector<int> unknowns;
+  Eigen::MatrixXd hessian;
+  Eigen::VectorXd gradient;
+};
+
+// The Gauss-Newton model of one patch: normals and tangent lengths are held at their current
+// values. With `from_layout` the target's foot and normal are the layout's (no evaluation of the
+// target).
+class TargetEnergy {
+ public:
+  TargetEnergy(const JunctionTopology& topology, const JunctionTarget& target,
+               const JunctionLayout& layout, const JunctionNet& net);
+
+  int patches() const { return static_cast<int>(models_.size()); }
+  const PatchModel& model(int patch) const { return models_[static_cast<std::size_t>(patch)]; }
+
+  // Fills the models at the net's current points.
+  void update(const JunctionNet& net, const EnergyWeights& weights);
+
+ private:
+  void update_patch(int patch, const JunctionNet& net, const EnergyWeights& weights);
+
+  const JunctionTopology& topology_;
+  const JunctionTarget& target_;
+  const JunctionLayout& layout_;
+  std::vector<PatchModel> models_;
+  std::vector<Eigen::VectorXd> scales_;  // local radius at each sample of a patch
+  Eigen::MatrixXd b_, bu_, bv_;          // 36 x samples
+  Eigen::VectorXd sample_weights_;
+  Eigen::MatrixXd roughness_;  // 36 x 36
+};
+
+}  // namespace angiospline
