@@ -1,7 +1,5 @@
 // Sweeps random junctions of every class: success, fairness and seconds, one line a class.
 // bench_junctions [COUNT [SEED [CLASS [DUMP_DIRECTORY]]]]
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -9,6 +7,8 @@
 #include <string>
 
 #include "junction_classes.h"
+#include <fmt/core.h>
+
 #include "modeling/junction.h"
 
 namespace {
@@ -33,8 +33,8 @@ int main(int argc, char** argv) {
   const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
   const std::string only = argc > 3 ? argv[3] : "";
   const std::string directory = argc > 4 ? argv[4] : "";
-  fmt::print("{:12} {:>5} {:>5} {:>5} {:>6} {:>9} {:>7} {:>8} {:>8} {:>7}\n", "class", "count", "ok",
-             "fair", "first", "angle", "jacob", "curv med", "curv max", "s");
+  fmt::print("{:12} {:>5} {:>5} {:>5} {:>6} {:>9} {:>7} {:>8} {:>8} {:>7}\n", "class", "count",
+             "ok", "fair", "first", "angle", "jacob", "curv med", "curv max", "s");
   for (const JunctionClass& family : junction_classes()) {
     if (!only.empty() && only != "all" && family.name != only) continue;
     Random random(seed);
@@ -56,11 +56,12 @@ int main(int argc, char** argv) {
       angle = std::max(angle, junction->worst_angle_deg);
       jacobian = std::min(jacobian, junction->jacobian_ratio);
       curvature.push_back(junction->curvature_times_radius);
-      if (!directory.empty()) dump(fmt::format("{}/{}_{}.txt", directory, family.name, k), *junction);
+      if (!directory.empty())
+        dump(fmt::format("{}/{}_{}.txt", directory, family.name, k), *junction);
     }
     std::sort(curvature.begin(), curvature.end());
-    fmt::print("{:12} {:5} {:5} {:5} {:6} {:9.1e} {:7.3f} {:8.2f} {:8.2f} {:7.3f}\n", family.name, count,
-               ok, fair, first, angle, jacobian,
+    fmt::print("{:12} {:5} {:5} {:5} {:6} {:9.1e} {:7.3f} {:8.2f} {:8.2f} {:7.3f}\n", family.name,
+               count, ok, fair, first, angle, jacobian,
                curvature.empty() ? 0 : curvature[curvature.size() / 2],
                curvature.empty() ? 0 : curvature.back(), seconds / count);
     std::fflush(stdout);

@@ -1,9 +1,10 @@
 #include "junction_classes.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include <Eigen/Geometry>
 
 namespace angiospline {
 namespace {
@@ -26,9 +27,11 @@ double least_angle(const std::vector<Vec3>& d) {
 }
 
 // Turned at random, so that nothing depends on the axes.
-JunctionSpec spec_of(std::vector<Vec3> directions, const std::vector<double>& radii, Random& random) {
-  const Eigen::Quaterniond turn(Eigen::Vector4d(random.gaussian(), random.gaussian(),
-                                                random.gaussian(), random.gaussian()).normalized());
+JunctionSpec spec_of(std::vector<Vec3> directions, const std::vector<double>& radii,
+                     Random& random) {
+  const Eigen::Quaterniond turn(
+      Eigen::Vector4d(random.gaussian(), random.gaussian(), random.gaussian(), random.gaussian())
+          .normalized());
   JunctionSpec spec;
   spec.name = "j";
   for (std::size_t b = 0; b < directions.size(); ++b) {
@@ -91,7 +94,8 @@ JunctionSpec cone_3(Random& random) {
   std::vector<double> r{1.0};
   for (int k = 0; k < 3; ++k) {
     const double turn = (120 * k + random.uniform(-20, 20)) * kDegree;
-    d.emplace_back(std::sin(half) * std::cos(turn), std::sin(half) * std::sin(turn), std::cos(half));
+    d.emplace_back(std::sin(half) * std::cos(turn), std::sin(half) * std::sin(turn),
+                   std::cos(half));
     r.push_back(random.uniform(0.4, 0.8));
   }
   return spec_of(d, r, random);
@@ -140,10 +144,12 @@ JunctionSpec planar(Random& random) {
 
 const std::vector<JunctionClass>& junction_classes() {
   static const std::vector<JunctionClass> kClasses{
-      {"ordinary", ordinary},       {"acute", acute},       {"one-sided 3", one_sided_3},
-      {"one-sided 4", one_sided_4}, {"cone 3", cone_3},     {"random 4", random_4},
-      {"random 5", random_5},       {"random 6", random_6}, {"random 8", random_8},
-      {"twig", twig},               {"collinear", collinear}, {"planar", planar}};
+      {"ordinary", ordinary},       {"acute", acute},
+      {"one-sided 3", one_sided_3}, {"one-sided 4", one_sided_4},
+      {"cone 3", cone_3},           {"random 4", random_4},
+      {"random 5", random_5},       {"random 6", random_6},
+      {"random 8", random_8},       {"twig", twig},
+      {"collinear", collinear},     {"planar", planar}};
   return kClasses;
 }
 

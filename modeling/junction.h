@@ -14,7 +14,7 @@ struct JunctionBranch {
   std::string name;
   Vec3 direction = Vec3::Zero();  // unit, away from the centre
   double radius_mm = 0.0;
-  double longest_mm = 0.0;        // the opening must lie no farther than this from the centre
+  double longest_mm = 0.0;  // the opening must lie no farther from the centre; 0: no bound
 };
 
 struct JunctionSpec {
@@ -26,14 +26,14 @@ struct JunctionSpec {
 // Where a body meets the junction: a plane circle of arcs, one for each sector of the branch.
 // Sector k lies between seams k and k + 1, counter-clockwise seen against `axis` (from outside,
 // looking at the junction), and is side kU0 of patches[k], whose v runs the same way.
-// Contract with the body: the arcs lie in the plane of the opening, neighbouring arcs meet with equal
-// derivatives at the seams, and the junction's tangent plane along them contains `axis`.
+// Contract with the body: the arcs lie in the plane of the opening, neighbouring arcs meet with
+// equal derivatives at the seams, and the junction's tangent plane along them contains `axis`.
 struct JunctionOpening {
   Vec3 center_mm = Vec3::Zero();
-  Vec3 axis = Vec3::Zero();        // unit, away from the junction: the branch's direction
+  Vec3 axis = Vec3::Zero();  // unit, away from the junction: the branch's direction
   double radius_mm = 0.0;
-  std::vector<Vec3> seams;         // unit, orthogonal to axis: from the centre to each seam point
-  std::vector<int> patches;        // of Junction::network
+  std::vector<Vec3> seams;   // unit, orthogonal to axis: from the centre to each seam point
+  std::vector<int> patches;  // of Junction::network
 };
 
 struct Junction {
@@ -43,13 +43,13 @@ struct Junction {
   double jacobian_ratio = 0.0;            // least |Su x Sv| over its mean on the same patch
   double curvature_times_radius = 0.0;    // largest curvature times the smallest branch radius
   double distance_over_radius = 0.0;      // from the union of cylinders, over the smallest radius
-  bool fair = true;                       // curvature below 20 over, distance below half, the smallest radius
-  int attempts = 1;                       // settings tried before one passed every gate
+  bool fair = true;  // curvature below 20 over, distance below half, the smallest radius
+  int attempts = 1;  // settings tried before one passed every gate
 };
 
 struct JunctionOptions {
-  double margin = 1.0;      // opening beyond the blend, in radii of the branch
-  double blend = 0.15;      // width of the blend between branches, in radii
+  double margin = 1.0;  // opening beyond the blend, in radii of the branch
+  double blend = 0.15;  // width of the blend between branches, in radii
 };
 
 // How far from the centre each branch's opening comes to lie, in mm; the order of the spec.
@@ -58,8 +58,9 @@ struct JunctionOptions {
 Result<std::vector<double>> opening_distances_mm(const JunctionSpec& spec,
                                                  const JunctionOptions& options = {});
 
-// The junction's patches. Errors: those of opening_distances_mm; a branch too short for its opening;
-// no setting gives a surface that passes every gate (the message names the best try's failure).
+// The junction's patches. Errors: those of opening_distances_mm; a branch too short for its
+// opening; no setting gives a surface that passes every gate (the message names the best try's
+// failure).
 Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options = {});
 
 }  // namespace angiospline

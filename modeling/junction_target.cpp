@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Geometry>
+
 namespace angiospline {
 namespace {
 

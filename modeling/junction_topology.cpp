@@ -216,8 +216,8 @@ SharedGrid::SharedGrid(const JunctionTopology& topology, int size)
       size_(size) {
   EXPECTS(size >= 2);
   for (int p = 0; p < static_cast<int>(topology.patches.size()); ++p) {
-    const JunctionPatch& patch = topology.patches[at(p)];
-    const bool is_a = topology.saddles[at(patch.saddle)].patch_a == p;
+    const JunctionPatch& patch = topology.patches[static_cast<std::size_t>(p)];
+    const bool is_a = topology.saddles[static_cast<std::size_t>(patch.saddle)].patch_a == p;
     patches_.push_back({patch.saddle, patch.from, patch.to, patch.next, is_a});
   }
   const int patches = static_cast<int>(patches_.size());

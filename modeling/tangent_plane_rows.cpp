@@ -16,9 +16,11 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 double binomial(int n, int k) {
   static constexpr auto kTable = [] {
     std::array<std::array<double, 12>, 12> t{};
-    for (std::size_t n = 0; n < 12; ++n) {
-      t[n][0] = 1;
-      for (std::size_t k = 1; k <= n; ++k) t[n][k] = t[n - 1][k - 1] + (k < n ? t[n - 1][k] : 0);
+    for (std::size_t row = 0; row < 12; ++row) {
+      t[row][0] = 1;
+      for (std::size_t i = 1; i <= row; ++i) {
+        t[row][i] = t[row - 1][i - 1] + (i < row ? t[row - 1][i] : 0);
+      }
     }
     return t;
   }();
