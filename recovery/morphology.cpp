@@ -1,0 +1,315 @@
+#include "recovery/morphology.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <numeric>
+
+namespace angiospline {
+namespace {
+
+bool touch(int dx, int dy, int dz, Connectivity c) {
+  const int steps = std::abs(dx) + std::abs(dy) + std::abs(dz);
+  return steps > 0 && steps <= (c == Connectivity::kFaces6    ? 1
+                                : c == Connectivity::kEdges18 ? 2
+                                                              : 3);
+}
+
+std::vector<Voxel> neighbour_steps(Connectivity c) {
+  std::vector<Voxel> steps;
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y)
+      for (int x = -1; x <= 1; ++x)
+        if (touch(x, y, z, c)) steps.push_back({x, y, z});
+  return steps;
+}
+
+// `mask` with every neighbour of a voxel of class `from` made that class too.
+Mask spread_once(const Mask& mask, bool from, const std::vector<Voxel>& steps) {
+  Mask out = mask;
+  const ImageGrid& grid = mask.grid;
+  const auto to = static_cast<std::uint8_t>(from);
+  std::size_t i = 0;
+  for (int z = 0; z < grid.size[2]; ++z)
+    for (int y = 0; y < grid.size[1]; ++y)
+      for (int x = 0; x < grid.size[0]; ++x, ++i) {
+        if ((mask.voxels[i] != 0) != from) continue;
+        out.voxels[i] = to;
+        for (const Voxel& s : steps) {
+          const Voxel n{x + s[0], y + s[1], z + s[2]};
+          if (grid.contains(n)) out[n] = to;
+        }
+      }
+  return out;
+}
+
+Mask spread(const Mask& mask, bool from, int steps, Connectivity neighbours) {
+  EXPECTS(steps >= 0);
+  const std::vector<Voxel> around = neighbour_steps(neighbours);
+  Mask out = mask;
+  for (auto& v : out.voxels) v = v != 0;
+  for (int k = 0; k < steps; ++k) out = spread_once(out, from, around);
+  return out;
+}
+
+// A stretch of equal voxels in one row: [begin, end).
+struct Run {
+  int begin, end;
+  int component;  // a node of the union-find forest, then the component's number
+};
+
+// Components of one class of a mask, held as runs: memory by the number of runs, not of voxels.
+class RunComponents {
+ public:
+  RunComponents(const Mask& mask, bool foreground, Connectivity neighbours);
+
+  const std::vector<Component>& list() const { return list_; }
+
+  // f(offset of the run's first voxel, length, component)
+  template <typename F>
+  void for_each_run(F&& f) const {
+    for (std::size_t row = 0; row + 1 < row_begin_.size(); ++row)
+      for (std::size_t r = row_begin_[row]; r < row_begin_[row + 1]; ++r)
+        f(row * width_ + static_cast<std::size_t>(runs_[r].begin),
+          static_cast<std::size_t>(runs_[r].end - runs_[r].begin),
+          static_cast<std::size_t>(runs_[r].component));
+  }
+
+ private:
+  int root(int k) {
+    while (parent_[static_cast<std::size_t>(k)] != k) {
+      int& p = parent_[static_cast<std::size_t>(k)];
+      p = parent_[static_cast<std::size_t>(p)];
+      k = p;
+    }
+    return k;
+  }
+  void join_rows(std::size_t a, std::size_t b, int reach);
+  void number(const ImageGrid& grid);
+
+  std::size_t width_;
+  std::vector<Run> runs_;
+  std::vector<std::size_t> row_begin_;
+  std::vector<int> parent_;
+  std::vector<Component> list_;
+};
+
+// Joins runs of two rows that overlap when one is widened by `reach`.
+void RunComponents::join_rows(std::size_t a, std::size_t b, int reach) {
+  std::size_t i = row_begin_[a], j = row_begin_[b];
+  while (i < row_begin_[a + 1] && j < row_begin_[b + 1]) {
+    const Run &p = runs_[i], &q = runs_[j];
+    if (p.begin < q.end + reach && q.begin < p.end + reach) {
+      const int rp = root(p.component), rq = root(q.component);
+      parent_[static_cast<std::size_t>(std::max(rp, rq))] = std::min(rp, rq);
+    }
+    if (p.end < q.end)
+      ++i;
+    else
+      ++j;
+  }
+}
+
+RunComponents::RunComponents(const Mask& mask, bool foreground, Connectivity neighbours)
+    : width_(static_cast<std::size_t>(mask.grid.size[0])) {
+  const Voxel n = mask.grid.size;
+  const auto rows = static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]);
+  row_begin_.reserve(rows + 1);
+  row_begin_.push_back(0);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const std::uint8_t* v = mask.voxels.data() + row * width_;
+    for (int x = 0; x < n[0];) {
+      if ((v[x] != 0) != foreground) {
+        ++x;
+        continue;
+      }
+      const int begin = x;
+      while (x < n[0] && (v[x] != 0) == foreground) ++x;
+      runs_.push_back({begin, x, static_cast<int>(runs_.size())});
+    }
+    row_begin_.push_back(runs_.size());
+  }
+  parent_.resize(runs_.size());
+  std::iota(parent_.begin(), parent_.end(), 0);
+  // Rows already seen that touch row (y, z); `reach` lets a run touch diagonally along x.
+  for (int z = 0; z < n[2]; ++z)
+    for (int y = 0; y < n[1]; ++y)
+      for (int dz = -1; dz <= 0; ++dz)
+        for (int dy = -1; dy <= (dz == 0 ? -1 : 1); ++dy) {
+          if (!touch(0, dy, dz, neighbours) || y + dy < 0 || y + dy >= n[1] || z + dz < 0) continue;
+          const auto row = [&](int yy, int zz) {
+            return static_cast<std::size_t>(zz) * static_cast<std::size_t>(n[1]) +
+                   static_cast<std::size_t>(yy);
+          };
+          join_rows(row(y + dy, z + dz), row(y, z), touch(1, dy, dz, neighbours) ? 1 : 0);
+        }
+  number(mask.grid);
+}
+
+// Replaces forest nodes by component numbers in order of the lowest offset (runs are in that order,
+// and the root of a tree is its lowest run), and gathers what is known of each.
+void RunComponents::number(const ImageGrid& grid) {
+  std::vector<int> number_of(runs_.size(), -1);
+  const auto height = static_cast<std::size_t>(grid.size[1]);
+  for (std::size_t row = 0; row + 1 < row_begin_.size(); ++row) {
+    const int y = static_cast<int>(row % height), z = static_cast<int>(row / height);
+    const bool edge_row = y == 0 || z == 0 || y == grid.size[1] - 1 || z == grid.size[2] - 1;
+    for (std::size_t r = row_begin_[row]; r < row_begin_[row + 1]; ++r) {
+      int& k = number_of[static_cast<std::size_t>(root(static_cast<int>(r)))];
+      if (k < 0) {
+        k = static_cast<int>(list_.size());
+        list_.push_back({0, {runs_[r].begin, y, z}, false});
+      }
+      Component& c = list_[static_cast<std::size_t>(k)];
+      c.voxels += static_cast<std::size_t>(runs_[r].end - runs_[r].begin);
+      c.touches_border |= edge_row || runs_[r].begin == 0 || runs_[r].end == grid.size[0];
+      runs_[r].component = k;
+    }
+  }
+  parent_.clear();
+  parent_.shrink_to_fit();
+}
+
+template <typename Keep>
+Mask kept(const Mask& mask, const RunComponents& components, Keep&& keep) {
+  Mask out(mask.grid);
+  components.for_each_run([&](std::size_t first, std::size_t length, std::size_t k) {
+    if (keep(k)) std::fill_n(out.voxels.begin() + static_cast<std::ptrdiff_t>(first), length, 1);
+  });
+  return out;
+}
+
+// Marks, in `out`, the holes of the slices of `mask` across `axis`.
+void fill_slice_holes(const Mask& mask, int axis, std::size_t largest, Filled& out) {
+  const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+  Mask slice;
+  slice.grid.size = {mask.grid.size[static_cast<std::size_t>(u)],
+                     mask.grid.size[static_cast<std::size_t>(v)], 1};
+  slice.voxels.resize(slice.grid.voxel_count());
+  const int width = slice.grid.size[0], height = slice.grid.size[1];
+  for (int k = 0; k < mask.grid.size[static_cast<std::size_t>(axis)]; ++k) {
+    const auto in_volume = [&](int a, int b) {
+      Voxel at{};
+      at[static_cast<std::size_t>(axis)] = k;
+      at[static_cast<std::size_t>(u)] = a;
+      at[static_cast<std::size_t>(v)] = b;
+      return mask.grid.offset(at);
+    };
+    bool any = false;
+    std::size_t i = 0;
+    for (int b = 0; b < height; ++b)
+      for (int a = 0; a < width; ++a, ++i) {
+        slice.voxels[i] = mask.voxels[in_volume(a, b)];
+        any |= slice.voxels[i] != 0;
+      }
+    if (!any) continue;
+    // In a slice of its own every voxel lies on the border in z, so borders are tested here.
+    const RunComponents background(slice, false, Connectivity::kFaces6);
+    std::vector<char> open(background.list().size(), 0);
+    background.for_each_run([&](std::size_t first, std::size_t length, std::size_t c) {
+      const Voxel at = slice.grid.voxel(first);
+      if (at[1] == 0 || at[1] == height - 1 || at[0] == 0 ||
+          at[0] + static_cast<int>(length) == width)
+        open[c] = 1;
+    });
+    for (std::size_t c = 0; c < open.size(); ++c) {
+      if (background.list()[c].voxels > largest) open[c] = 1;
+      if (!open[c]) ++out.regions;
+    }
+    background.for_each_run([&](std::size_t first, std::size_t length, std::size_t c) {
+      if (open[c]) return;
+      const Voxel at = slice.grid.voxel(first);
+      for (int a = 0; a < static_cast<int>(length); ++a)
+        out.mask.voxels[in_volume(at[0] + a, at[1])] = 1;
+    });
+  }
+}
+
+}  // namespace
+
+Mask dilate(const Mask& mask, int steps, Connectivity neighbours) {
+  return spread(mask, true, steps, neighbours);
+}
+
+Mask erode(const Mask& mask, int steps, Connectivity neighbours) {
+  return spread(mask, false, steps, neighbours);
+}
+
+Mask close(const Mask& mask, int steps, Connectivity neighbours) {
+  // Dilation must have room beyond the image, or the erosion would take too little away there.
+  Mask padded;
+  padded.grid.size = mask.grid.size;
+  for (auto& n : padded.grid.size) n += 2 * steps;
+  padded.voxels.assign(padded.grid.voxel_count(), 0);
+  Mask out = mask;
+  for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
+    const Voxel v = mask.grid.voxel(i);
+    padded[{v[0] + steps, v[1] + steps, v[2] + steps}] = mask.voxels[i] != 0;
+  }
+  padded = erode(dilate(padded, steps, neighbours), steps, neighbours);
+  for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
+    const Voxel v = mask.grid.voxel(i);
+    out.voxels[i] = padded[{v[0] + steps, v[1] + steps, v[2] + steps}];
+  }
+  return out;
+}
+
+Filled fill_cavities(const Mask& mask, std::size_t largest) {
+  Filled out{mask, 0, 0};
+  const RunComponents background(mask, false, Connectivity::kFaces6);
+  const auto is_cavity = [&](std::size_t k) {
+    const Component& c = background.list()[k];
+    return !c.touches_border && c.voxels <= largest;
+  };
+  background.for_each_run([&](std::size_t first, std::size_t length, std::size_t k) {
+    if (is_cavity(k))
+      std::fill_n(out.mask.voxels.begin() + static_cast<std::ptrdiff_t>(first), length, 1);
+  });
+  for (std::size_t k = 0; k < background.list().size(); ++k)
+    if (is_cavity(k)) {
+      ++out.regions;
+      out.voxels += background.list()[k].voxels;
+    }
+  return out;
+}
+
+Filled fill_holes(const Mask& mask, std::size_t largest) {
+  Filled out{mask, 0, 0};
+  for (int axis = 0; axis < 3; ++axis) fill_slice_holes(mask, axis, largest, out);
+  out.voxels = voxel_count(out.mask) - voxel_count(mask);
+  return out;
+}
+
+Components connected_components(const Mask& mask, Connectivity neighbours) {
+  const RunComponents runs(mask, true, neighbours);
+  Components out{Image<std::int32_t>(mask.grid), runs.list()};
+  runs.for_each_run([&](std::size_t first, std::size_t length, std::size_t k) {
+    std::fill_n(out.labels.voxels.begin() + static_cast<std::ptrdiff_t>(first), length,
+                static_cast<std::int32_t>(k) + 1);
+  });
+  return out;
+}
+
+std::size_t component_count(const Mask& mask, Connectivity neighbours) {
+  return RunComponents(mask, true, neighbours).list().size();
+}
+
+Mask largest_component(const Mask& mask, Connectivity neighbours) {
+  const RunComponents runs(mask, true, neighbours);
+  const auto best =
+      std::max_element(runs.list().begin(), runs.list().end(),
+                       [](const Component& a, const Component& b) { return a.voxels < b.voxels; });
+  const auto chosen = static_cast<std::size_t>(best - runs.list().begin());
+  return kept(mask, runs, [&](std::size_t k) { return k == chosen; });
+}
+
+Mask without_small_components(const Mask& mask, std::size_t smallest, Connectivity neighbours) {
+  const RunComponents runs(mask, true, neighbours);
+  return kept(mask, runs, [&](std::size_t k) { return runs.list()[k].voxels >= smallest; });
+}
+
+std::size_t voxel_count(const Mask& mask) {
+  return mask.voxels.size() -
+         static_cast<std::size_t>(std::count(mask.voxels.begin(), mask.voxels.end(), 0));
+}
+
+}  // namespace angiospline
