@@ -48,11 +48,6 @@ void add_tubes(Scene& scene) {
           round_cone(b.points_mm.col(k), b.radii_mm[k], b.points_mm.col(k + 1), b.radii_mm[k + 1]));
 }
 
-Vec3 on_ring(const Ring& ring, double angle_rad) {
-  return ring.centre_mm + ring.ring_radius_mm * (std::cos(angle_rad) * ring.start +
-                                                 std::sin(angle_rad) * ring.axis.cross(ring.start));
-}
-
 Scene rings() {
   Scene scene{Vec3::Constant(128), {}, {}, "three interlocking orthogonal rings"};
   const char* names[] = {"ring_xy", "ring_yz", "ring_zx"};
@@ -62,8 +57,7 @@ Scene rings() {
         torus(ring.centre_mm, ring.axis, ring.ring_radius_mm, ring.tube_radius_mm));
     constexpr int kPoints = 180;
     std::vector<Vec3> points;
-    for (int i = 0; i <= kPoints; ++i)
-      points.push_back(on_ring(ring, 2 * kPi * (i % kPoints) / kPoints));
+    for (int i = 0; i <= kPoints; ++i) points.push_back(ring.at(2 * kPi * (i % kPoints) / kPoints));
     scene.tree.nodes.push_back({fmt::format("{}_start", names[k]), points.front()});
     add_branch(scene.tree, names[k], k, k, points,
                std::vector<double>(points.size(), ring.tube_radius_mm));
@@ -244,6 +238,11 @@ void move_to_world(CenterlineTree& tree, const ImageGrid& grid) {
 }
 
 }  // namespace
+
+Vec3 Ring::at(double angle_rad) const {
+  return centre_mm +
+         ring_radius_mm * (std::cos(angle_rad) * start + std::sin(angle_rad) * axis.cross(start));
+}
 
 std::vector<Ring> phantom_rings() {
   // Each centre is moved half a ring radius along the next axis: every two rings are linked, and

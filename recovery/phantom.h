@@ -68,6 +68,8 @@ std::optional<PhantomKind> phantom_kind(const std::string& name);
 struct Ring {
   Vec3 centre_mm, axis, start;  // angle 0 lies along `start`
   double ring_radius_mm, tube_radius_mm;
+
+  Vec3 at(double angle_rad) const;  // on the centerline
 };
 std::vector<Ring> phantom_rings();
 

@@ -29,13 +29,13 @@ TEST(Coverage, GivesTheVolumesOfSolids) {
   grid.size = {64, 64, 64};
   const Vec3 c(31.2, 30.7, 31.9), axis = Vec3(1, 2, -2).normalized();
   const auto volume = [&](const Shape& s) { return volume_of(coverage(grid, {s})); };
-  EXPECT_NEAR(volume(torus(c, axis, 18, 5)) / (2 * kPi * kPi * 18 * 25), 1, 2e-3);
-  EXPECT_NEAR(volume(flat_cylinder(c - 15 * axis, c + 15 * axis, 7)) / (kPi * 49 * 30), 1, 2e-3);
-  EXPECT_NEAR(volume(round_cone(c, 9, c, 9)) / (4.0 / 3 * kPi * 729), 1, 2e-3);
+  EXPECT_NEAR(volume(torus(c, axis, 18, 5)) / (2 * kPi * kPi * 18 * 25), 1, 3e-3);
+  EXPECT_NEAR(volume(flat_cylinder(c - 15 * axis, c + 15 * axis, 7)) / (kPi * 49 * 30), 1, 3e-3);
+  EXPECT_NEAR(volume(round_cone(c, 9, c, 9)) / (4.0 / 3 * kPi * 729), 1, 3e-3);
   EXPECT_NEAR(volume(round_cone(c, 6, c + 14 * axis, 6)) / (4.0 / 3 * kPi * 216 + kPi * 36 * 14), 1,
-              2e-3);
+              3e-3);
   // A ball inside the other's ball adds nothing.
-  EXPECT_NEAR(volume(round_cone(c, 9, c + 2 * axis, 3)) / (4.0 / 3 * kPi * 729), 1, 2e-3);
+  EXPECT_NEAR(volume(round_cone(c, 9, c + 2 * axis, 3)) / (4.0 / 3 * kPi * 729), 1, 3e-3);
 }
 
 TEST(Coverage, CountsAUnionOnceAndHonoursSpacing) {
@@ -83,11 +83,7 @@ TEST(Phantom, RingsAreLinkedAndApart) {
       if (a == b) continue;
       int crossings = 0;
       const Ring &r = rings[a], &disc = rings[b];
-      const auto at = [&](int k) -> Vec3 {
-        const double t = 2 * kPi * (k + 0.5) / 720;
-        return r.centre_mm +
-               r.ring_radius_mm * (std::cos(t) * r.start + std::sin(t) * r.axis.cross(r.start));
-      };
+      const auto at = [&](int k) { return r.at(2 * kPi * (k + 0.5) / 720); };
       for (int k = 0; k < 720; ++k) {
         const double h0 = disc.axis.dot(at(k) - disc.centre_mm);
         const double h1 = disc.axis.dot(at(k + 1) - disc.centre_mm);
@@ -118,7 +114,7 @@ TEST(Phantom, TruthLiesAroundItsCenterlines) {
         ASSERT_TRUE(p.truth.grid.contains(v));
         EXPECT_EQ(p.truth[v], 1);
       }
-    if (kind != PhantomKind::kBifurcation) EXPECT_GT(points, 0U);
+    EXPECT_TRUE(points > 0 || kind == PhantomKind::kBifurcation);
     for (const CenterlineBranch& b : p.tree.branches) {
       EXPECT_EQ(b.points_mm.col(0), p.tree.nodes[static_cast<std::size_t>(b.from)].position_mm);
       EXPECT_EQ(b.points_mm.rightCols<1>(),
@@ -154,9 +150,7 @@ TEST(Phantom, LosesSignalEveryFortyFiveDegrees) {
   const Phantom p = made(PhantomKind::kRings, o);
   for (const Ring& r : phantom_rings())
     for (int k = 0; k < 16; ++k) {
-      const double t = kPi * k / 8;
-      const Vec3 at = r.centre_mm + r.ring_radius_mm * (std::cos(t) * r.start +
-                                                        std::sin(t) * r.axis.cross(r.start));
+      const Vec3 at = r.at(kPi * k / 8);
       const Voxel v{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
                     static_cast<int>(std::lround(at[2]))};
       EXPECT_EQ(p.image[v], k % 2 ? 200 : 1200) << k;
