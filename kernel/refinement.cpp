@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/contract.h"
+#include "kernel/blossom.h"
 
 namespace angiospline {
 namespace {
@@ -172,6 +173,32 @@ CompactRows refinement_matrix_boehm(const KnotVector& coarse, const KnotVector& 
   return A;
 }
 
+CompactRows rewriting_matrix(const KnotVector& from, const KnotVector& to) {
+  EXPECTS(from.degree() == to.degree() && from.first() == to.first() && from.last() == to.last());
+  const auto interior = [](const KnotVector& knots) {
+    const std::vector<double>& U = knots.knots();
+    return std::pair{std::upper_bound(U.begin(), U.end(), knots.first()),
+                     std::lower_bound(U.begin(), U.end(), knots.last())};
+  };
+  const auto [from_begin, from_end] = interior(from);
+  const auto [to_begin, to_end] = interior(to);
+  EXPECTS(std::includes(to_begin, to_end, from_begin, from_end));
+  CompactRows A(to.control_point_count(), from.control_point_count(), from.order());
+  std::array<double, kMaxOrder> row;
+  for (int i = 0; i < A.rows(); ++i) {
+    const int span = span_inside_support(from, to, i);
+    blossom_row(from, span, to.knots().data() + i + 1, row.data());
+    A.set_row(i, span - from.degree(), row.data(), from.order());
+  }
+  return A;
+}
+
+template <int D>
+BSplineCurve<D> rewrite(const BSplineCurve<D>& curve, const KnotVector& knots) {
+  return BSplineCurve<D>(
+      knots, rewriting_matrix(curve.knots(), knots).template apply<D>(curve.control_points()));
+}
+
 template <int D>
 BSplineCurve<D> refine(const BSplineCurve<D>& curve, const KnotVector& fine) {
   const CompactRows A = refinement_matrix(curve.knots(), fine);
@@ -220,6 +247,7 @@ Result<BSplineCurve<D>> insert_knots(const BSplineCurve<D>& curve, std::vector<d
 
 #define ANGIOSPLINE_INSTANTIATE(D)                                                     \
   template BSplineCurve<D> refine(const BSplineCurve<D>&, const KnotVector&);          \
+  template BSplineCurve<D> rewrite(const BSplineCurve<D>&, const KnotVector&);         \
   template BSplineSurface<D> refine(const BSplineSurface<D>&, const KnotVector&,       \
                                     const KnotVector&);                                \
   template BSplineSurface<D> transform_u(const BSplineSurface<D>&, const CompactRows&, \

@@ -43,6 +43,13 @@ template <int D>
 BSplineSurface<D> refine(const BSplineSurface<D>& surface, const KnotVector& fine_u,
                          const KnotVector& fine_v);
 
+// The same curve over any knots of its degree and domain that have every interior knot at least as
+// often; knots beyond the domain are free. So it clamps, unclamps and makes periodic as well as it
+// refines. Each new control point is one blossom value; O(control points * degree^2).
+template <int D>
+BSplineCurve<D> rewrite(const BSplineCurve<D>& curve, const KnotVector& knots);
+CompactRows rewriting_matrix(const KnotVector& from, const KnotVector& to);
+
 // Net transforms: A along u (v fixed), and along v; the result has the knots given.
 template <int D>
 BSplineSurface<D> transform_u(const BSplineSurface<D>& surface, const CompactRows& A, KnotVector u);
