@@ -7,14 +7,12 @@
 namespace angiospline {
 namespace {
 
-bool touch(int dx, int dy, int dz, Connectivity c) {
+bool touch(int dx, int dy, int dz, Neighbours c) {
   const int steps = std::abs(dx) + std::abs(dy) + std::abs(dz);
-  return steps > 0 && steps <= (c == Connectivity::kFaces6    ? 1
-                                : c == Connectivity::kEdges18 ? 2
-                                                              : 3);
+  return steps > 0 && steps <= (c == Neighbours::kFaces6 ? 1 : c == Neighbours::kEdges18 ? 2 : 3);
 }
 
-std::vector<Voxel> neighbour_steps(Connectivity c) {
+std::vector<Voxel> neighbour_steps(Neighbours c) {
   std::vector<Voxel> steps;
   for (int z = -1; z <= 1; ++z)
     for (int y = -1; y <= 1; ++y)
@@ -42,7 +40,7 @@ Mask spread_once(const Mask& mask, bool from, const std::vector<Voxel>& steps) {
   return out;
 }
 
-Mask spread(const Mask& mask, bool from, int steps, Connectivity neighbours) {
+Mask spread(const Mask& mask, bool from, int steps, Neighbours neighbours) {
   EXPECTS(steps >= 0);
   const std::vector<Voxel> around = neighbour_steps(neighbours);
   Mask out = mask;
@@ -60,7 +58,7 @@ struct Run {
 // Components of one class of a mask, held as runs: memory by the number of runs, not of voxels.
 class RunComponents {
  public:
-  RunComponents(const Mask& mask, bool foreground, Connectivity neighbours);
+  RunComponents(const Mask& mask, bool foreground, Neighbours neighbours);
 
   const std::vector<Component>& list() const { return list_; }
 
@@ -109,7 +107,7 @@ void RunComponents::join_rows(std::size_t a, std::size_t b, int reach) {
   }
 }
 
-RunComponents::RunComponents(const Mask& mask, bool foreground, Connectivity neighbours)
+RunComponents::RunComponents(const Mask& mask, bool foreground, Neighbours neighbours)
     : width_(static_cast<std::size_t>(mask.grid.size[0])) {
   const Voxel n = mask.grid.size;
   const auto rows = static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]);
@@ -203,7 +201,7 @@ void fill_slice_holes(const Mask& mask, int axis, std::size_t largest, Filled& o
       }
     if (!any) continue;
     // In a slice of its own every voxel lies on the border in z, so borders are tested here.
-    const RunComponents background(slice, false, Connectivity::kFaces6);
+    const RunComponents background(slice, false, Neighbours::kFaces6);
     std::vector<char> open(background.list().size(), 0);
     background.for_each_run([&](std::size_t first, std::size_t length, std::size_t c) {
       const Voxel at = slice.grid.voxel(first);
@@ -226,15 +224,15 @@ void fill_slice_holes(const Mask& mask, int axis, std::size_t largest, Filled& o
 
 }  // namespace
 
-Mask dilate(const Mask& mask, int steps, Connectivity neighbours) {
+Mask dilate(const Mask& mask, int steps, Neighbours neighbours) {
   return spread(mask, true, steps, neighbours);
 }
 
-Mask erode(const Mask& mask, int steps, Connectivity neighbours) {
+Mask erode(const Mask& mask, int steps, Neighbours neighbours) {
   return spread(mask, false, steps, neighbours);
 }
 
-Mask close(const Mask& mask, int steps, Connectivity neighbours) {
+Mask close(const Mask& mask, int steps, Neighbours neighbours) {
   // Dilation must have room beyond the image, or the erosion would take too little away there.
   Mask padded;
   padded.grid.size = mask.grid.size;
@@ -255,7 +253,7 @@ Mask close(const Mask& mask, int steps, Connectivity neighbours) {
 
 Filled fill_cavities(const Mask& mask, std::size_t largest) {
   Filled out{mask, 0, 0};
-  const RunComponents background(mask, false, Connectivity::kFaces6);
+  const RunComponents background(mask, false, Neighbours::kFaces6);
   const auto is_cavity = [&](std::size_t k) {
     const Component& c = background.list()[k];
     return !c.touches_border && c.voxels <= largest;
@@ -279,7 +277,7 @@ Filled fill_holes(const Mask& mask, std::size_t largest) {
   return out;
 }
 
-Components connected_components(const Mask& mask, Connectivity neighbours) {
+Components connected_components(const Mask& mask, Neighbours neighbours) {
   const RunComponents runs(mask, true, neighbours);
   Components out{Image<std::int32_t>(mask.grid), runs.list()};
   runs.for_each_run([&](std::size_t first, std::size_t length, std::size_t k) {
@@ -289,11 +287,11 @@ Components connected_components(const Mask& mask, Connectivity neighbours) {
   return out;
 }
 
-std::size_t component_count(const Mask& mask, Connectivity neighbours) {
+std::size_t component_count(const Mask& mask, Neighbours neighbours) {
   return RunComponents(mask, true, neighbours).list().size();
 }
 
-Mask largest_component(const Mask& mask, Connectivity neighbours) {
+Mask largest_component(const Mask& mask, Neighbours neighbours) {
   const RunComponents runs(mask, true, neighbours);
   const auto best =
       std::max_element(runs.list().begin(), runs.list().end(),
@@ -302,7 +300,7 @@ Mask largest_component(const Mask& mask, Connectivity neighbours) {
   return kept(mask, runs, [&](std::size_t k) { return k == chosen; });
 }
 
-Mask without_small_components(const Mask& mask, std::size_t smallest, Connectivity neighbours) {
+Mask without_small_components(const Mask& mask, std::size_t smallest, Neighbours neighbours) {
   const RunComponents runs(mask, true, neighbours);
   return kept(mask, runs, [&](std::size_t k) { return runs.list()[k].voxels >= smallest; });
 }

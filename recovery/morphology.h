@@ -11,17 +11,17 @@
 namespace angiospline {
 
 // Which neighbours touch a voxel: over a face; a face or an edge; a face, an edge or a corner.
-enum class Connectivity { kFaces6 = 6, kEdges18 = 18, kCorners26 = 26 };
+enum class Neighbours { kFaces6 = 6, kEdges18 = 18, kCorners26 = 26 };
 
 // The mask grown by `steps` layers of neighbours. Grows vessels that nearly touch together: use it
 // sparingly. Time linear in voxels.
-Mask dilate(const Mask& mask, int steps = 1, Connectivity neighbours = Connectivity::kFaces6);
+Mask dilate(const Mask& mask, int steps = 1, Neighbours neighbours = Neighbours::kFaces6);
 
 // The mask without its `steps` outer layers; beyond the image counts as foreground.
-Mask erode(const Mask& mask, int steps = 1, Connectivity neighbours = Connectivity::kFaces6);
+Mask erode(const Mask& mask, int steps = 1, Neighbours neighbours = Neighbours::kFaces6);
 
 // Dilation then erosion: closes gaps and tunnels up to 2 * steps voxels wide. Contains the mask.
-Mask close(const Mask& mask, int steps = 1, Connectivity neighbours = Connectivity::kFaces6);
+Mask close(const Mask& mask, int steps = 1, Neighbours neighbours = Neighbours::kFaces6);
 
 struct Filled {
   Mask mask;
@@ -52,17 +52,17 @@ struct Components {
   Image<std::int32_t> labels;
   std::vector<Component> list;  // list[k] has label k + 1
 };
-Components connected_components(const Mask& mask, Connectivity neighbours);
+Components connected_components(const Mask& mask, Neighbours neighbours);
 
 // How many components; without the label image.
-std::size_t component_count(const Mask& mask, Connectivity neighbours);
+std::size_t component_count(const Mask& mask, Neighbours neighbours);
 
 // Only the component with most voxels (ties: the lowest offset). Empty mask: empty.
-Mask largest_component(const Mask& mask, Connectivity neighbours = Connectivity::kCorners26);
+Mask largest_component(const Mask& mask, Neighbours neighbours = Neighbours::kCorners26);
 
 // Only components of at least `smallest` voxels.
 Mask without_small_components(const Mask& mask, std::size_t smallest,
-                              Connectivity neighbours = Connectivity::kCorners26);
+                              Neighbours neighbours = Neighbours::kCorners26);
 
 // Number of foreground voxels.
 std::size_t voxel_count(const Mask& mask);

@@ -22,7 +22,7 @@ Mask random_mask(std::uint64_t seed, double share, Voxel size = {13, 9, 11}) {
 }
 
 int reach(Connectivity c) {
-  return c == Connectivity::kFaces6 ? 1 : c == Connectivity::kEdges18 ? 2 : 3;
+  return c == Neighbours::kFaces6 ? 1 : c == Neighbours::kEdges18 ? 2 : 3;
 }
 
 // Labels by plain flood fill.
@@ -47,8 +47,8 @@ Image<std::int32_t> flooded(const Mask& m, bool foreground, Connectivity c) {
   return labels;
 }
 
-constexpr Connectivity kAll[] = {Connectivity::kFaces6, Connectivity::kEdges18,
-                                 Connectivity::kCorners26};
+constexpr Connectivity kAll[] = {Neighbours::kFaces6, Neighbours::kEdges18,
+                                 Neighbours::kCorners26};
 
 TEST(Morphology, ComponentsAreThoseOfAFloodFill) {
   std::size_t seen = 0;
@@ -70,7 +70,7 @@ TEST(Morphology, CavitiesAreTheBackgroundThatReachesNoBorder) {
   std::size_t filled = 0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const Mask m = random_mask(seed, 0.75);
-    const Image<std::int32_t> labels = flooded(m, false, Connectivity::kFaces6);
+    const Image<std::int32_t> labels = flooded(m, false, Neighbours::kFaces6);
     std::vector<char> open(m.voxels.size() + 1, 0);
     for (std::size_t i = 0; i < m.voxels.size(); ++i) {
       const Voxel v = m.grid.voxel(i);
@@ -115,11 +115,11 @@ TEST(Morphology, AThinTunnelIsAHoleAndAWideLoopIsNot) {
 TEST(Morphology, DilationOfOneVoxelIsItsNeighbourhood) {
   Mask m = empty(9, 9, 9);
   m[{4, 4, 4}] = 200;  // any value but 0 is foreground
-  EXPECT_EQ(voxel_count(dilate(m, 1, Connectivity::kFaces6)), 7U);
-  EXPECT_EQ(voxel_count(dilate(m, 1, Connectivity::kEdges18)), 19U);
-  EXPECT_EQ(voxel_count(dilate(m, 1, Connectivity::kCorners26)), 27U);
-  EXPECT_EQ(voxel_count(dilate(m, 2, Connectivity::kFaces6)), 25U);  // octahedron
-  EXPECT_EQ(voxel_count(dilate(m, 0, Connectivity::kFaces6)), 1U);
+  EXPECT_EQ(voxel_count(dilate(m, 1, Neighbours::kFaces6)), 7U);
+  EXPECT_EQ(voxel_count(dilate(m, 1, Neighbours::kEdges18)), 19U);
+  EXPECT_EQ(voxel_count(dilate(m, 1, Neighbours::kCorners26)), 27U);
+  EXPECT_EQ(voxel_count(dilate(m, 2, Neighbours::kFaces6)), 25U);  // octahedron
+  EXPECT_EQ(voxel_count(dilate(m, 0, Neighbours::kFaces6)), 1U);
 }
 
 TEST(Morphology, ErosionIsDilationOfTheComplement) {
@@ -153,7 +153,7 @@ TEST(Morphology, ClosingDoesNotGrowAlongTheBorder) {
   Mask m = empty(6, 6, 6);
   m[{0, 0, 0}] = 1;
   m[{5, 3, 3}] = 1;
-  EXPECT_EQ(close(m, 2, Connectivity::kCorners26).voxels, m.voxels);
+  EXPECT_EQ(close(m, 2, Neighbours::kCorners26).voxels, m.voxels);
 }
 
 TEST(Morphology, KeepsTheLargestComponentAndTheFirstOfEquals) {
@@ -171,8 +171,8 @@ TEST(Morphology, EmptyAndFullMasksHaveStatedAnswers) {
   const Mask none = empty(4, 4, 4);
   Mask full = none;
   for (auto& v : full.voxels) v = 1;
-  EXPECT_EQ(component_count(none, Connectivity::kFaces6), 0U);
-  EXPECT_EQ(component_count(full, Connectivity::kFaces6), 1U);
+  EXPECT_EQ(component_count(none, Neighbours::kFaces6), 0U);
+  EXPECT_EQ(component_count(full, Neighbours::kFaces6), 1U);
   EXPECT_EQ(largest_component(none).voxels, none.voxels);
   EXPECT_EQ(fill_cavities(none).voxels, 0U);
   EXPECT_EQ(fill_holes(none, 100).voxels, 0U);

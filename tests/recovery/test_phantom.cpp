@@ -74,7 +74,7 @@ TEST(Phantom, HasTheSizesOfTheThesis) {
 
 TEST(Phantom, RingsAreLinkedAndApart) {
   const Phantom p = made(PhantomKind::kRings);
-  EXPECT_EQ(component_count(p.truth, Connectivity::kCorners26), 3U);
+  EXPECT_EQ(component_count(p.truth, Neighbours::kCorners26), 3U);
   EXPECT_EQ(cycle_count(p.tree), 3);
   const std::vector<Ring> rings = phantom_rings();
   // Linked: a ring meets the flat disc of another exactly once.
@@ -169,7 +169,7 @@ TEST(Phantom, RandomTreeIsATreeWithRoomAroundIt) {
     EXPECT_EQ(p.tree.branches.size(), 15U);
     EXPECT_EQ(p.tree.nodes.size(), 16U);
     EXPECT_EQ(cycle_count(p.tree), 0);
-    EXPECT_EQ(component_count(p.truth, Connectivity::kCorners26), 1U);
+    EXPECT_EQ(component_count(p.truth, Neighbours::kCorners26), 1U);
     EXPECT_EQ(fill_cavities(p.truth).regions, 0U);
   }
 }

@@ -209,8 +209,8 @@ TEST(RegionGrowing, SeveralSeedsGrowSeveralVessels) {
   const auto one = grow_region(p.image, {seeds[0]});
   const auto three = grow_region(p.image, seeds);
   ASSERT_TRUE(one && three);
-  EXPECT_EQ(component_count(one->mask, Connectivity::kCorners26), 1U);
-  EXPECT_EQ(component_count(three->mask, Connectivity::kCorners26), 3U);
+  EXPECT_EQ(component_count(one->mask, Neighbours::kCorners26), 1U);
+  EXPECT_EQ(component_count(three->mask, Neighbours::kCorners26), 3U);
   expect_grown(three->mask, p.truth);
   EXPECT_EQ(three->report.seeds.size(), 3U);
 }
