@@ -1,0 +1,413 @@
+#include "modeling/seed_model.h"
+
+#include <algorithm>
+#include <atomic>
+#include <optional>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "base/contract.h"
+#include "modeling/assembly.h"
+#include "modeling/body.h"
+#include "modeling/body_path.h"
+#include "modeling/seed_plan.h"
+
+namespace angiospline {
+namespace {
+
+constexpr int kJunctionRounds = 4;      // of building, merging what failed and building again
+constexpr double kMergeReach = 6.0;     // radii of branch between junctions that may be merged
+constexpr double kFoldedBody = 0.02;    // Jacobian ratio of a body that counts as folded
+constexpr double kShortestPiece = 0.1;  // length of a body that is worth having, in radii
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+// A junction that was built, for one state of the plan.
+struct BuiltJunction {
+  JunctionSpec spec;
+  std::optional<Junction> junction;
+  std::optional<Error> error;
+};
+
+bool same(const JunctionSpec& a, const JunctionSpec& b) {
+  if (a.name != b.name || a.center_mm != b.center_mm || a.branches.size() != b.branches.size()) {
+    return false;
+  }
+  for (std::size_t k = 0; k < a.branches.size(); ++k) {
+    const JunctionBranch& x = a.branches[k];
+    const JunctionBranch& y = b.branches[k];
+    if (x.direction != y.direction || x.radius_mm != y.radius_mm || x.longest_mm != y.longest_mm) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// The junction with the options asked for; if that fails, with wider openings and with a narrower
+// or wider blend.
+BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& options) {
+  BuiltJunction built{node.spec, {}, node.error};
+  if (node.error) return built;
+  for (const auto& [margin, blend] : {std::pair{1.0, 1.0}, {1.6, 1.0}, {1.0, 0.67}, {0.6, 1.5}}) {
+    JunctionOptions tried = options;
+    tried.margin *= margin;
+    tried.blend *= blend;
+    Result<Junction> junction = make_junction(node.spec, tried);
+    if (junction) {
+      built.junction = std::move(*junction);
+      built.error.reset();
+      return built;
+    }
+    if (!built.error) built.error = junction.error();
+  }
+  return built;
+}
+
+class Seeder {
+ public:
+  Seeder(const SmoothedTree& tree, const SeedOptions& options, const Progress& progress)
+      : tree_(tree), options_(options), progress_(progress), plan_(tree, options.junction) {}
+
+  Result<Model> run() {
+    if (!build_junctions()) return fail(cancelled("junctions"));
+    number_junctions();
+    if (!build_bodies()) return fail(cancelled("bodies"));
+    progress_.at("assemble", 0.0);
+    if (pieces_.empty() && junctions_.empty()) {
+      return fail({ErrorKind::kFailed,
+                   "nothing could be built",
+                   tree_.tree.source,
+                   failed_.empty() ? std::string() : failed_.front().why,
+                   {}});
+    }
+    Model model;
+    model.network = assemble(junctions_, pieces_);
+    model.tree = tree_.tree;
+    model.assumptions = tree_.tree.assumptions;
+    model.warnings = tree_.warnings;
+    model.warnings.insert(model.warnings.end(), plan_.warnings().begin(), plan_.warnings().end());
+    model.warnings.insert(model.warnings.end(), warnings_.begin(), warnings_.end());
+    model.failed = std::move(failed_);
+    progress_.at("assemble", 1.0);
+    return model;
+  }
+
+ private:
+  // ---- junctions
+
+  bool build_junctions() {
+    built_.resize(plan_.nodes().size());
+    for (int round = 0; round < kJunctionRounds; ++round) {
+      std::vector<int> work;
+      for (int n = 0; n < static_cast<int>(plan_.nodes().size()); ++n) {
+        const PlannedNode& node = plan_.nodes()[index(n)];
+        if (node.is_junction() && !same(built_[index(n)].spec, node.spec)) work.push_back(n);
+      }
+      std::atomic<std::size_t> done{0};
+      tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
+        if (progress_.should_stop()) return;
+        built_[index(work[k])] = build_junction(plan_.nodes()[index(work[k])], options_.junction);
+        progress_.at("junctions", static_cast<double>(++done) / static_cast<double>(work.size()));
+      });
+      if (progress_.should_stop()) return false;
+      if (round + 1 == kJunctionRounds || !change_failed(round)) break;
+    }
+    return true;
+  }
+
+  // First directions taken farther out, then merging with the nearest neighbour.
+  bool change_failed(int round) {
+    bool changed = false;
+    for (int n = 0; n < static_cast<int>(built_.size()); ++n) {
+      if (!plan_.nodes()[index(n)].is_junction() || built_[index(n)].junction) continue;
+      if (round == 0) {
+        plan_.reach_farther(n, 1.6);
+        changed = true;
+      } else if (plan_.merge_with_nearest(n, kMergeReach)) {
+        changed = true;
+      }
+    }
+    if (changed) plan_.settle();
+    return changed;
+  }
+
+  void number_junctions() {
+    number_.assign(built_.size(), -1);
+    for (std::size_t n = 0; n < built_.size(); ++n) {
+      const PlannedNode& node = plan_.nodes()[n];
+      if (!node.is_junction()) continue;
+      if (built_[n].junction) {
+        number_[n] = static_cast<int>(junctions_.size());
+        junctions_.push_back(std::move(*built_[n].junction));
+      } else {
+        failed_.push_back(
+            {"junction_" + node.name, built_[n].error ? built_[n].error->message() : "not built"});
+      }
+    }
+  }
+
+  // ---- bodies
+
+  struct Outcome {
+    std::vector<BodyPiece> pieces;
+    std::vector<std::string> warnings;
+    std::optional<FailedPart> failed;
+  };
+
+  bool build_bodies() {
+    const std::vector<PlannedBranch>& branches = plan_.branches();
+    std::vector<Outcome> outcomes(branches.size());
+    std::atomic<std::size_t> done{0};
+    tbb::parallel_for(std::size_t{0}, branches.size(), [&](std::size_t b) {
+      if (!branches[b].alive || progress_.should_stop()) return;
+      outcomes[b] = is_ring(static_cast<int>(b)) ? build_ring(static_cast<int>(b))
+                                                 : build_body(static_cast<int>(b));
+      progress_.at("bodies", static_cast<double>(++done) / static_cast<double>(branches.size()));
+    });
+    if (progress_.should_stop()) return false;
+    for (Outcome& outcome : outcomes) {
+      for (BodyPiece& piece : outcome.pieces) pieces_.push_back(std::move(piece));
+      for (std::string& text : outcome.warnings) warnings_.push_back(std::move(text));
+      if (outcome.failed) failed_.push_back(std::move(*outcome.failed));
+    }
+    return true;
+  }
+
+  bool is_ring(int b) const {
+    const PlannedBranch& branch = plan_.branches()[index(b)];
+    return branch.from == branch.to && plan_.nodes()[index(branch.from)].ends.size() == 2;
+  }
+
+  // Where one end of a body lies on its branch and what is beyond it.
+  struct Stop {
+    PathEnd path;
+    BodyEnd body;
+    BodyLink link;
+    double along = 0;  // from the branch's beginning
+  };
+
+  Stop stop_at(int b, bool at_end) const {
+    const PlannedBranch& branch = plan_.branches()[index(b)];
+    const int n = at_end ? branch.to : branch.from;
+    const PlannedNode& node = plan_.nodes()[index(n)];
+    Stop stop;
+    stop.along = at_end ? branch.length_mm() : 0.0;
+    if (!node.is_junction()) {
+      const Vec4 tip = branch.at(stop.along);
+      stop.path = {tip.head<3>(), tip(3), Vec3::Zero()};
+      stop.link.rim_name = rim_name(n, stop.link.rim_kind);
+      return stop;
+    }
+    const auto slot = static_cast<std::size_t>(
+        std::find_if(node.ends.begin(), node.ends.end(),
+                     [&](const BranchEnd& e) { return e.branch == b && e.at_end == at_end; }) -
+        node.ends.begin());
+    double distance = node.spec.branches[slot].radius_mm;
+    if (number_[index(n)] < 0) {
+      if (!node.error) distance = node.wanted_mm[slot];
+    } else {
+      distance =
+          (junctions_[index(number_[index(n)])].openings[slot].center_mm - node.center_mm).norm();
+    }
+    const double from_node = branch.along_at_distance({b, at_end}, node.center_mm, distance)
+                                 .value_or(branch.length_mm());
+    stop.along = at_end ? branch.length_mm() - from_node : from_node;
+    if (number_[index(n)] < 0) {
+      const Vec4 place = branch.at(stop.along);
+      stop.path = {place.head<3>(), place(3), Vec3::Zero()};
+      stop.link.rim_name =
+          fmt::format("cap_{}_{}{}", node.name, branch.name,
+                      branch.from == branch.to ? (at_end ? "_end" : "_begin") : "");
+      return stop;
+    }
+    stop.link.kind = BodyLink::Kind::kOpening;
+    stop.link.junction = number_[index(n)];
+    stop.link.opening = static_cast<int>(slot);
+    stop.body = opening_end(junctions_[index(stop.link.junction)], stop.link.opening, !at_end);
+    stop.path = {stop.body.center_mm, stop.body.radius_mm, stop.body.tangent};
+    return stop;
+  }
+
+  std::string rim_name(int n, RimKind& kind) const {
+    const PlannedNode& node = plan_.nodes()[index(n)];
+    if (flow_[index(n)] == 0) {
+      kind = RimKind::kCap;
+      return "cap_" + node.name;
+    }
+    if (node.inlet) {
+      kind = RimKind::kInlet;
+      return tree_.tree.inlets.size() == 1 ? "inlet" : "inlet_" + node.name;
+    }
+    kind = RimKind::kOutlet;
+    return "outlet_" + node.name;
+  }
+
+  Outcome build_body(int b) const {
+    const PlannedBranch& branch = plan_.branches()[index(b)];
+    const Stop start = stop_at(b, false);
+    const Stop end = stop_at(b, true);
+    Outcome outcome;
+    const double radius = (start.path.radius_mm + end.path.radius_mm) / 2;
+    const bool capped =
+        start.link.kind == BodyLink::Kind::kRim || end.link.kind == BodyLink::Kind::kRim;
+    if (capped && end.along - start.along < kShortestPiece * radius) {
+      outcome.failed =
+          FailedPart{"wall_" + branch.name, "nothing of it is left beyond its junctions"};
+      return outcome;
+    }
+    BodyPiece piece = sweep(followed(branch, start, end), start, end);
+    if (piece.body.jacobian_ratio < kFoldedBody) {
+      // The path is too crooked for its radius: between its ends it goes the shortest way.
+      BodyPiece direct = sweep(straight(start, end), start, end);
+      if (direct.body.jacobian_ratio > piece.body.jacobian_ratio) {
+        piece = std::move(direct);
+        outcome.warnings.push_back(
+            fmt::format("branch {} bends more tightly than its radius allows; it was straightened",
+                        branch.name));
+      }
+    }
+    if (piece.body.jacobian_ratio < kFoldedBody) {
+      outcome.warnings.push_back(fmt::format("the wall of branch {} folds (Jacobian ratio {:.2g})",
+                                             branch.name, piece.body.jacobian_ratio));
+    }
+    piece.name = "wall_" + branch.name;
+    outcome.pieces.push_back(std::move(piece));
+    return outcome;
+  }
+
+  static Eigen::Matrix4Xd straight(const Stop& start, const Stop& end) {
+    Eigen::Matrix4Xd target(4, 2);
+    target.col(0) << start.path.point_mm, start.path.radius_mm;
+    target.col(1) << end.path.point_mm, end.path.radius_mm;
+    return target;
+  }
+
+  // The branch's samples strictly between the two ends.
+  static Eigen::Matrix4Xd followed(const PlannedBranch& branch, const Stop& start,
+                                   const Stop& end) {
+    const double clear = 0.05 * (start.path.radius_mm + end.path.radius_mm);
+    std::vector<Eigen::Index> inside;
+    for (Eigen::Index i = 0; i < branch.samples.cols(); ++i) {
+      const double along = branch.along_mm[static_cast<std::size_t>(i)];
+      if (along > start.along + clear && along < end.along - clear) inside.push_back(i);
+    }
+    if (branch.straight || inside.size() < 2) return straight(start, end);
+    return branch.samples(Eigen::all, inside);
+  }
+
+  BodyPiece sweep(const Eigen::Matrix4Xd& target, const Stop& start, const Stop& end) const {
+    const BodyPath path = fit_body_path(target, start.path, end.path);
+    BodyPiece piece;
+    piece.start = start.body.tangent.isZero() ? free_end(path.curve, 0.0) : start.body;
+    piece.end = end.body.tangent.isZero() ? free_end(path.curve, 1.0) : end.body;
+    piece.start_link = start.link;
+    piece.end_link = end.link;
+    piece.body = make_body(path, piece.start, piece.end, {options_.body_tolerance});
+    piece.radius_mm = smallest_radius(path.curve);
+    return piece;
+  }
+
+  static double smallest_radius(const BSplineCurve<4>& curve) {
+    double least = std::numeric_limits<double>::infinity();
+    const int count = 4 * curve.knots().control_point_count();
+    for (int i = 0; i <= count; ++i) {
+      least = std::min(least, curve.at(static_cast<double>(i) / count)(3));
+    }
+    return least;
+  }
+
+  // A closed ring without junctions: two bodies on two circles. The path is fitted over one and a
+  // half rounds, so that its closing point is like any other.
+  Outcome build_ring(int b) const {
+    const PlannedBranch& branch = plan_.branches()[index(b)];
+    const Eigen::Matrix4Xd& once = branch.samples;
+    const double length = branch.length_mm();
+    const Eigen::Index n = once.cols();
+    std::vector<Eigen::Index> columns;
+    for (const int turn : {-1, 0, 1}) {
+      for (Eigen::Index i = 0; i + 1 < n; ++i) {
+        const double along = branch.along_mm[static_cast<std::size_t>(i)] + turn * length;
+        if (along >= -0.25 * length && along <= 1.25 * length) columns.push_back(i);
+      }
+    }
+    const Eigen::Matrix4Xd wrapped = once(Eigen::all, columns);
+    const auto tip = [&](const Vec4& p) { return PathEnd{p.head<3>(), p(3), Vec3::Zero()}; };
+    const BodyPath whole = fit_body_path(wrapped, tip(wrapped.col(0)), tip(wrapped.rightCols<1>()));
+    std::array<PathEnd, 2> ends;
+    std::array<BodyEnd, 2> circles;
+    for (const int side : {0, 1}) {
+      const double t = side == 0 ? 1.0 / 6 : 0.5;
+      const Vec4 place = whole.curve.at(t);
+      const Vec3 tangent = whole.curve.at(t, 1).head<3>().normalized();
+      ends[index(side)] = {place.head<3>(), place(3), tangent};
+      circles[index(side)] = {
+          place.head<3>(), tangent, place(3),
+          two_arc_circle(place.head<3>(), place(3), tangent, tangent.unitOrthogonal()), true};
+    }
+    Outcome outcome;
+    for (const int half : {0, 1}) {
+      constexpr int kSteps = 200;
+      Eigen::Matrix4Xd target(4, kSteps - 1);
+      for (int i = 1; i < kSteps; ++i) {
+        target.col(i - 1) = whole.curve.at(1.0 / 6 + (half + static_cast<double>(i) / kSteps) / 3);
+      }
+      Stop start{ends[index(half)], circles[index(half)], {}, 0.0};
+      Stop end{ends[index(1 - half)], circles[index(1 - half)], {}, length / 2};
+      start.link.kind = end.link.kind = BodyLink::Kind::kCircle;
+      start.link.circle = 2 * b + half;
+      end.link.circle = 2 * b + 1 - half;
+      outcome.pieces.push_back(sweep(target, start, end));
+      outcome.pieces.back().name = "wall_" + branch.name;
+    }
+    return outcome;
+  }
+
+ public:
+  // Which nodes lie in a component with an inlet: only there is the direction of flow known.
+  void find_flow() {
+    const std::vector<int> component = components_of_nodes(tree_.tree);
+    std::vector<char> fed(component.size() + 1, 0);
+    for (const int inlet : tree_.tree.inlets) fed[index(component[index(inlet)])] = 1;
+    for (const int c : component) flow_.push_back(fed[index(c)]);
+  }
+
+ private:
+  const SmoothedTree& tree_;
+  const SeedOptions& options_;
+  const Progress& progress_;
+  SeedPlan plan_;
+  std::vector<BuiltJunction> built_;  // one for each node of the plan
+  std::vector<int> number_;           // of each node's junction, or -1
+  std::vector<char> flow_;
+  std::vector<Junction> junctions_;
+  std::vector<BodyPiece> pieces_;
+  std::vector<std::string> warnings_;
+  std::vector<FailedPart> failed_;
+};
+
+}  // namespace
+
+Result<Model> seed_model(const CenterlineTree& tree, const SeedOptions& options,
+                         const Progress& progress) {
+  const Result<SmoothedTree> smoothed = smooth_centerlines(tree, options.smoothing, progress);
+  if (!smoothed) return fail(smoothed.error());
+  return seed_smoothed(*smoothed, options, progress);
+}
+
+Result<Model> seed_smoothed(const SmoothedTree& tree, const SeedOptions& options,
+                            const Progress& progress) {
+  if (tree.paths.empty()) {
+    return fail({ErrorKind::kBadInput, "the tree has no branches", tree.tree.source, {}, {}});
+  }
+  progress.at("plan", 0.0);
+  Seeder seeder(tree, options, progress);
+  seeder.find_flow();
+  Result<Model> model = seeder.run();
+  if (!model) return model;
+  if (auto error = find_defect(model->network)) return fail(*error);
+  return model;
+}
+
+}  // namespace angiospline

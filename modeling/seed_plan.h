@@ -1,0 +1,96 @@
+// Which junctions and bodies a smoothed tree becomes, and where the ones end and the others begin.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modeling/junction.h"
+#include "modeling/smooth_centerlines.h"
+
+namespace angiospline {
+
+// One end of a branch: `at_end` is where its path ends, otherwise where it begins.
+struct BranchEnd {
+  int branch = -1;
+  bool at_end = false;
+};
+
+// A branch as the plan sees it: samples of its smoothed path. A branch that has left the plan (it
+// was dropped, merged into a junction or joined to another) keeps its place with `alive` false.
+struct PlannedBranch {
+  std::string name;
+  Eigen::Matrix4Xd samples;      // x, y, z, radius in mm
+  std::vector<double> along_mm;  // arc length at each sample
+  int from = -1;                 // nodes of the plan
+  int to = -1;
+  bool straight = false;  // too short to bend: runs straight between its two nodes
+  bool alive = true;
+
+  double length_mm() const { return along_mm.back(); }
+  Vec4 at(double along) const;  // linear between samples, held beyond the ends
+  // Arc length, counted from `end`, where the path first comes to `distance_mm` from `center`;
+  // nothing if it never does.
+  std::optional<double> along_at_distance(BranchEnd end, const Vec3& center,
+                                          double distance_mm) const;
+};
+
+// Free end (one branch end), ring (two ends of one branch) or junction (three or more).
+struct PlannedNode {
+  std::string name;  // of merged nodes: "a+b"
+  Vec3 center_mm = Vec3::Zero();
+  std::vector<BranchEnd> ends;
+  bool alive = true;
+  bool inlet = false;
+
+  // Of a junction, once it is measured; in the order of `ends`.
+  JunctionSpec spec;
+  std::vector<double> wanted_mm;  // distance of each opening with room to spare
+  std::vector<double> least_mm;   // and with the least margin
+  std::optional<Error> error;     // why no openings could be found
+  double reach = 1.0;             // directions are taken at this multiple of the openings' distance
+
+  bool is_junction() const { return alive && ends.size() >= 3; }
+};
+
+// The plan keeps its own laws: every live branch has room for the openings at both its ends and a
+// body between them; no node has exactly two ends of different branches.
+class SeedPlan {
+ public:
+  // Merges, drops and extends until every branch has room. Parallel over nodes, linear in the tree.
+  SeedPlan(const SmoothedTree& tree, const JunctionOptions& options);
+
+  const std::vector<PlannedNode>& nodes() const { return nodes_; }
+  const std::vector<PlannedBranch>& branches() const { return branches_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+  // After a junction failed: look for directions farther out, or merge it with the nearest junction
+  // no farther than `radii` of the branch between them. False if there is none. Then settle()
+  // again.
+  void reach_farther(int node, double factor);
+  bool merge_with_nearest(int node, double radii);
+  void settle();
+
+ private:
+  struct Room;
+  void measure(PlannedNode& node) const;
+  Room room_of(int branch) const;
+  double end_along(int branch, bool at_end, bool wanted) const;
+  void set_longest();
+  void extend(int branch, double missing_mm);
+  void drop(int branch, const std::string& why);
+  void merge(int branch, const std::string& why);
+  void join_through(int node);
+  void detach(BranchEnd end);
+  PlannedNode& node_at(BranchEnd end);
+  const PlannedNode& node_at(BranchEnd end) const;
+  int slot_of(BranchEnd end) const;
+
+  JunctionOptions options_;
+  std::vector<PlannedNode> nodes_;
+  std::vector<PlannedBranch> branches_;
+  std::vector<char> dirty_;  // nodes to measure again
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace angiospline
