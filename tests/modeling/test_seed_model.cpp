@@ -1,0 +1,265 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <set>
+
+#include "network_measures.h"
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+#include "modeling/seed_model.h"
+
+namespace angiospline {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// Builds trees branch by branch.
+struct TreeMaker {
+  CenterlineTree tree;
+
+  int node(const Vec3& p, const std::string& name = {}) {
+    tree.nodes.push_back({name.empty() ? std::to_string(tree.nodes.size()) : name, p});
+    return static_cast<int>(tree.nodes.size()) - 1;
+  }
+
+  // A branch along `shape` (0 to 1), from and to nodes whose positions it ends at.
+  void branch(int from, int to, double radius, const std::function<Vec3(double)>& shape,
+              int points = 20) {
+    CenterlineBranch b;
+    b.name = tree.nodes[static_cast<std::size_t>(from)].name + "_" +
+             tree.nodes[static_cast<std::size_t>(to)].name;
+    b.from = from;
+    b.to = to;
+    b.points_mm.resize(3, points + 1);
+    for (int i = 0; i <= points; ++i) b.points_mm.col(i) = shape(static_cast<double>(i) / points);
+    b.points_mm.col(0) = tree.nodes[static_cast<std::size_t>(from)].position_mm;
+    b.points_mm.rightCols<1>() = tree.nodes[static_cast<std::size_t>(to)].position_mm;
+    b.radii_mm = Eigen::VectorXd::Constant(points + 1, radius);
+    tree.branches.push_back(std::move(b));
+  }
+
+  void line(int from, int to, double radius) {
+    const Vec3 a = tree.nodes[static_cast<std::size_t>(from)].position_mm;
+    const Vec3 b = tree.nodes[static_cast<std::size_t>(to)].position_mm;
+    branch(from, to, radius, [=](double t) { return Vec3((1 - t) * a + t * b); });
+  }
+};
+
+TreeMaker bifurcation() {
+  TreeMaker maker;
+  const int root = maker.node({0, 0, -12}, "root");
+  const int middle = maker.node({0, 0, 0}, "middle");
+  const int left = maker.node({-8, 0, 9}, "left");
+  const int right = maker.node({7, 2, 10}, "right");
+  maker.line(root, middle, 1.5);
+  maker.line(middle, left, 1.1);
+  maker.line(middle, right, 1.2);
+  maker.tree.inlets = {root};
+  return maker;
+}
+
+std::set<std::string> rim_names(const SurfaceNetwork& network) {
+  std::set<std::string> names;
+  for (const Rim& rim : network.rims) names.insert(rim.name);
+  return names;
+}
+
+std::set<std::string> region_names(const SurfaceNetwork& network) {
+  std::set<std::string> names;
+  for (const Region& region : network.regions) names.insert(region.name);
+  return names;
+}
+
+void expect_smooth(const SurfaceNetwork& network) {
+  const testing::SeamMeasure seams = testing::measure_seams(network, 9);
+  EXPECT_GT(seams.samples, 0);
+  EXPECT_LT(seams.gap_mm, 1e-11);
+  EXPECT_LT(seams.angle_deg, 1e-6);
+  EXPECT_GT(testing::least_jacobian_ratio(network, 9), 0.02);
+}
+
+TEST(SeedModel, ASingleVesselIsOneBodyWithTwoRims) {
+  TreeMaker maker;
+  const int a = maker.node({0, 0, 0}, "a");
+  const int b = maker.node({0, 0, 20}, "b");
+  maker.line(a, b, 2);
+  maker.tree.inlets = {a};
+  const Result<Model> model = seed_model(maker.tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_EQ(rim_names(model->network), (std::set<std::string>{"inlet", "outlet_b"}));
+  EXPECT_EQ(region_names(model->network), (std::set<std::string>{"wall_a_b"}));
+  EXPECT_NEAR(testing::enclosed_volume_mm3(model->network), kPi * 4 * 20, 0.01 * kPi * 80);
+  for (const Rim& rim : model->network.rims) {
+    EXPECT_NEAR(rim.normal.z(), rim.name == "inlet" ? -1 : 1, 1e-6);
+    EXPECT_EQ(rim.kind, rim.name == "inlet" ? RimKind::kInlet : RimKind::kOutlet);
+  }
+}
+
+TEST(SeedModel, ABifurcationHasItsNamesAndIsSmoothEverywhere) {
+  const Result<Model> model = seed_model(bifurcation().tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(model->failed.empty());
+  EXPECT_EQ(rim_names(model->network),
+            (std::set<std::string>{"inlet", "outlet_left", "outlet_right"}));
+  EXPECT_EQ(region_names(model->network),
+            (std::set<std::string>{"junction_middle", "wall_root_middle", "wall_middle_left",
+                                   "wall_middle_right"}));
+  EXPECT_EQ(model->network.patches.size(), 12u);
+  expect_smooth(model->network);
+  // More than the thickest branch alone, less than the three laid side by side.
+  const double volume = testing::enclosed_volume_mm3(model->network);
+  const double sum = kPi * (2.25 * 12 + 1.21 * std::sqrt(145) + 1.44 * std::sqrt(153));
+  EXPECT_GT(volume, 0.85 * sum);
+  EXPECT_LT(volume, 1.02 * sum);
+}
+
+TEST(SeedModel, WithoutInletsRimsAreCaps) {
+  CenterlineTree tree = bifurcation().tree;
+  tree.inlets.clear();
+  const Result<Model> model = seed_model(tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_EQ(rim_names(model->network),
+            (std::set<std::string>{"cap_root", "cap_left", "cap_right"}));
+}
+
+TEST(SeedModel, ScalesWithItsInput) {
+  // By a power of two, so that no rounding tells the two apart.
+  constexpr double kScale = 1.0 / 1024;
+  const Result<SmoothedTree> tree = smooth_centerlines(bifurcation().tree);
+  ASSERT_TRUE(tree);
+  SmoothedTree tiny = *tree;
+  for (CenterlineNode& node : tiny.tree.nodes) node.position_mm *= kScale;
+  for (std::size_t b = 0; b < tiny.paths.size(); ++b) {
+    tiny.tree.branches[b].points_mm *= kScale;
+    tiny.tree.branches[b].radii_mm *= kScale;
+    const BSplineCurve<4>& path = tree->paths[b];
+    std::vector<double> knots = path.knots().knots();
+    for (double& t : knots) t *= kScale;
+    tiny.paths[b] = BSplineCurve<4>(*KnotVector::make(5, knots), kScale * path.control_points());
+  }
+  const Result<Model> one = seed_smoothed(*tree);
+  const Result<Model> small = seed_smoothed(tiny);
+  ASSERT_TRUE(one && small);
+  ASSERT_EQ(one->network.control_points_mm.cols(), small->network.control_points_mm.cols());
+  EXPECT_LT((one->network.control_points_mm - small->network.control_points_mm / kScale)
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-9);
+}
+
+TEST(SeedModel, ARingWithoutJunctionsIsATorus) {
+  TreeMaker maker;
+  const int a = maker.node({10, 0, 0}, "a");
+  maker.branch(
+      a, a, 2,
+      [](double t) { return Vec3(10 * std::cos(2 * kPi * t), 10 * std::sin(2 * kPi * t), 0); }, 60);
+  const Result<Model> model = seed_model(maker.tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(model->network.rims.empty());
+  EXPECT_EQ(model->network.patches.size(), 4u);
+  expect_smooth(model->network);
+  EXPECT_NEAR(testing::enclosed_volume_mm3(model->network) / (2 * kPi * kPi * 10 * 4), 1, 0.01);
+}
+
+TEST(SeedModel, ARingOfFourJunctionsKeepsItsLoop) {
+  TreeMaker maker;
+  std::vector<int> ring;
+  for (int k = 0; k < 4; ++k) {
+    const double a = kPi * k / 2;
+    ring.push_back(maker.node({15 * std::cos(a), 15 * std::sin(a), 0}));
+  }
+  for (int k = 0; k < 4; ++k) {
+    const double a = kPi * k / 2;
+    maker.branch(ring[static_cast<std::size_t>(k)], ring[static_cast<std::size_t>((k + 1) % 4)], 1,
+                 [=](double t) {
+                   const double b = a + kPi * t / 2;
+                   return Vec3(15 * std::cos(b), 15 * std::sin(b), 0);
+                 });
+  }
+  for (int k = 0; k < 4; ++k) {
+    const double a = kPi * k / 2;
+    const int tip = maker.node({25 * std::cos(a), 25 * std::sin(a), 3});
+    maker.line(ring[static_cast<std::size_t>(k)], tip, 0.8);
+  }
+  const Result<Model> model = seed_model(maker.tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(model->failed.empty());
+  EXPECT_EQ(model->network.rims.size(), 4u);
+  EXPECT_EQ(model->network.regions.size(), 12u);
+  expect_smooth(model->network);
+}
+
+TEST(SeedModel, JunctionsTooNearEachOtherBecomeOneAndSaySo) {
+  TreeMaker maker;
+  const int root = maker.node({0, 0, -12}, "root");
+  const int a = maker.node({0, 0, 0}, "a");
+  const int b = maker.node({0.3, 0, 0.8}, "b");
+  maker.line(root, a, 1.5);
+  maker.line(a, b, 1.2);
+  maker.line(a, maker.node({-9, 0, 7}, "p"), 1.0);
+  maker.line(b, maker.node({9, 3, 6}, "q"), 1.0);
+  maker.line(b, maker.node({2, -10, 5}, "s"), 1.0);
+  const Result<Model> model = seed_model(maker.tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(model->failed.empty());
+  EXPECT_TRUE(region_names(model->network).contains("junction_a+b"));
+  EXPECT_TRUE(std::any_of(model->warnings.begin(), model->warnings.end(), [](const auto& w) {
+    return w.find("a and b became one") != std::string::npos;
+  }));
+  EXPECT_EQ(model->network.rims.size(), 4u);
+  expect_smooth(model->network);
+}
+
+TEST(SeedModel, RandomTreesAreSmoothAndNameWhatFailed) {
+  Random random(11);
+  int junctions = 0;
+  int failed = 0;
+  for (int trial = 0; trial < 4; ++trial) {
+    TreeMaker maker;
+    struct Tip {
+      int node;
+      Vec3 direction;
+      double radius;
+    };
+    const int root = maker.node({0, 0, 0});
+    std::vector<Tip> tips{{root, Vec3(0, 0, 1), 2.0}};
+    for (int level = 0; level < 3; ++level) {
+      std::vector<Tip> next;
+      for (const Tip& tip : tips) {
+        const Vec3 start = maker.tree.nodes[static_cast<std::size_t>(tip.node)].position_mm;
+        const int end = maker.node(start + tip.radius * random.uniform(10, 16) * tip.direction);
+        maker.line(tip.node, end, tip.radius);
+        if (level == 2) continue;
+        const Vec3 side = (tip.direction.unitOrthogonal() * random.gaussian() +
+                           tip.direction.cross(tip.direction.unitOrthogonal()) * random.gaussian())
+                              .normalized();
+        for (const double sign : {-1.0, 1.0}) {
+          const double angle = random.uniform(0.5, 0.9);
+          next.push_back({end, std::cos(angle) * tip.direction + sign * std::sin(angle) * side,
+                          tip.radius * random.uniform(0.6, 0.85)});
+        }
+      }
+      tips = std::move(next);
+    }
+    const Result<Model> model = seed_model(maker.tree);
+    ASSERT_TRUE(model) << model.error().message();
+    expect_smooth(model->network);
+    failed += static_cast<int>(model->failed.size());
+    junctions += 3;
+  }
+  EXPECT_EQ(junctions, 12);
+  EXPECT_EQ(failed, 0);
+}
+
+TEST(SeedModel, StopsWhenAsked) {
+  Progress progress;
+  progress.stop_requested = [] { return true; };
+  const Result<Model> model = seed_model(bifurcation().tree, {}, progress);
+  ASSERT_FALSE(model);
+  EXPECT_EQ(model.error().kind, ErrorKind::kCancelled);
+}
+
+}  // namespace
+}  // namespace angiospline
