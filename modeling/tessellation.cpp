@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
-#include "modeling/patch_grid.h"
+#include "kernel/grid.h"
 
 namespace angiospline {
 namespace {
@@ -95,12 +95,12 @@ PatchDemand demand_of(const BSplineSurface<3>& surface, double tolerance_mm, dou
   const std::vector<double>& vs = demand.v.parameters;
   demand.u.values.assign(us.size(), 0.0);
   demand.v.values.assign(vs.size(), 0.0);
-  const PatchGrid grid = evaluate_grid(surface, us, vs, 2);
+  const SurfaceGrid<3> grid = evaluate_grid(surface, us, vs, 2);
   for (std::size_t i = 0; i < us.size(); ++i) {
     for (std::size_t j = 0; j < vs.size(); ++j) {
       const auto c = static_cast<Eigen::Index>(i * vs.size() + j);
-      const Vec3 su = grid.at(1, 0).col(c);
-      const Vec3 sv = grid.at(0, 1).col(c);
+      const Vec3 su = grid.partial(1, 0).col(c);
+      const Vec3 sv = grid.partial(0, 1).col(c);
       const Vec3 cross = su.cross(sv);
       const double lu = su.norm();
       const double lv = sv.norm();
@@ -110,9 +110,9 @@ PatchDemand demand_of(const BSplineSurface<3>& surface, double tolerance_mm, dou
       const auto normal_part = [&](const Vec3& d) {
         return regular ? std::abs(n.dot(d)) : d.norm();
       };
-      const double twist = normal_part(grid.at(1, 1).col(c));
-      const double uu = normal_part(grid.at(2, 0).col(c)) + (lv > 0 ? twist * lu / lv : 0);
-      const double vv = normal_part(grid.at(0, 2).col(c)) + (lu > 0 ? twist * lv / lu : 0);
+      const double twist = normal_part(grid.partial(1, 1).col(c));
+      const double uu = normal_part(grid.partial(2, 0).col(c)) + (lv > 0 ? twist * lu / lv : 0);
+      const double vv = normal_part(grid.partial(0, 2).col(c)) + (lu > 0 ? twist * lv / lu : 0);
       demand.u.values[i] =
           std::max({demand.u.values[i], std::sqrt(uu / (4 * tolerance_mm)), lu / longest_mm});
       demand.v.values[j] =
@@ -372,15 +372,15 @@ class Tessellator {
     const Patch& p = network_.patches[at(patch)];
     const std::vector<double> us = interior_lines(p.u, demands_[at(patch)].u);
     const std::vector<double> vs = interior_lines(p.v, demands_[at(patch)].v);
-    const PatchGrid grid = evaluate_grid(surfaces_[at(patch)], us, vs, 1);
+    const SurfaceGrid<3> grid = evaluate_grid(surfaces_[at(patch)], us, vs, 1);
     const int first = static_cast<int>(points_.size());
     const int rows = static_cast<int>(us.size());
     const int columns = static_cast<int>(vs.size());
     for (int i = 0; i < rows; ++i) {
       for (int j = 0; j < columns; ++j) {
         const Eigen::Index c = static_cast<Eigen::Index>(i) * columns + j;
-        add_point(patch, {us[at(i)], vs[at(j)]}, grid.at(0, 0).col(c));
-        normals_.back() = Vec3(grid.at(1, 0).col(c)).cross(Vec3(grid.at(0, 1).col(c)));
+        add_point(patch, {us[at(i)], vs[at(j)]}, grid.partial(0, 0).col(c));
+        normals_.back() = Vec3(grid.partial(1, 0).col(c)).cross(Vec3(grid.partial(0, 1).col(c)));
       }
     }
     const auto interior = [&](int i, int j) { return first + i * columns + j; };

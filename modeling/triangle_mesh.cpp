@@ -137,6 +137,14 @@ std::string to_string(PartKind kind) {
 
 bool is_wall(PartKind kind) { return kind == PartKind::kBody || kind == PartKind::kJunction; }
 
+PartKind part_kind_of_name(std::string_view name) {
+  for (const PartKind kind :
+       {PartKind::kJunction, PartKind::kInlet, PartKind::kOutlet, PartKind::kCap}) {
+    if (name.rfind(to_string(kind), 0) == 0) return kind;
+  }
+  return PartKind::kBody;
+}
+
 std::vector<int> components_of_triangles(const TriangleMesh& mesh) {
   std::vector<int> parent = identity(static_cast<std::size_t>(mesh.points_mm.cols()));
   for (int t = 0; t < mesh.triangles.cols(); ++t) {

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -18,6 +19,9 @@ enum class PartKind { kBody, kJunction, kInlet, kOutlet, kCap };
 // "body", "junction", "inlet", "outlet", "cap"; and whether the part belongs to the wall.
 std::string to_string(PartKind kind);
 bool is_wall(PartKind kind);
+
+// The kind a name tells: "junction*", "inlet*", "outlet*", "cap*"; anything else is a body.
+PartKind part_kind_of_name(std::string_view name);
 
 struct MeshPart {
   std::string name;
@@ -35,6 +39,12 @@ struct TriangleMesh {
   // Unit normals of the wall at each point, or empty. A point that no wall triangle uses has the
   // normal of its cap. Caps are plane: their triangles use plane normals, also on the rim.
   Points3 normals;
+};
+
+// One number at each point of a mesh: a residual, a deviation, a curvature.
+struct MeshField {
+  std::string name;        // with its unit: "distance_mm"
+  Eigen::VectorXd values;  // one for each point; NaN where not known
 };
 
 // What a mesh is as a surface. A closed, orientable, connected surface without boundary has

@@ -7,6 +7,8 @@
 
 #include <Eigen/Geometry>
 
+#include "kernel/quadrature.h"
+
 namespace angiospline::samples {
 namespace {
 
@@ -41,22 +43,17 @@ struct Quadrature {
   std::vector<double> weights;
 };
 
-// Eight-point Gauss-Legendre on every span: exact for degree 15.
+// Eight points on every span: exact for degree 15.
 Quadrature gauss(const KnotVector& knots) {
-  constexpr std::array<double, 4> x{0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
-                                    0.9602898564975363};
-  constexpr std::array<double, 4> w{0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
-                                    0.1012285362903763};
+  const GaussRule rule = gauss_legendre(8);
   Quadrature q;
   const std::vector<double> breaks = knots.breakpoints();
   for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
     const double half = 0.5 * (breaks[i + 1] - breaks[i]);
     const double mid = 0.5 * (breaks[i + 1] + breaks[i]);
-    for (std::size_t k = 0; k < 4; ++k) {
-      for (const double sign : {-1.0, 1.0}) {
-        q.nodes.push_back(mid + sign * half * x[k]);
-        q.weights.push_back(half * w[k]);
-      }
+    for (Eigen::Index k = 0; k < rule.nodes.size(); ++k) {
+      q.nodes.push_back(mid + half * rule.nodes[k]);
+      q.weights.push_back(half * rule.weights[k]);
     }
   }
   return q;
