@@ -14,18 +14,41 @@ namespace angiospline {
 namespace {
 
 constexpr int kDegree = 5;
-constexpr int kFewestSamples = 5;     // sparser branches get points between their points
-constexpr double kSpanRadii = 0.5;    // knots of the smoothing spline need not lie closer
-constexpr int kMostSpans = 20000;     // of one branch
-constexpr double kLeastNoise = 1e-3;  // in mean radii: far below any voxel, above rounding
-constexpr int kRelaxations = 16;      // halvings of a strength that moves points too far
-constexpr int kStiffenings = 24;      // doublings of the stiffness where a bend is too sharp
-constexpr int kBendSamples = 6;       // of curvature, for each span
+constexpr int kFewestSamples = 5;  // sparser branches get points between their points
+constexpr double kGapRadii =
+    1.5;  // points farther apart get points between them that only keep limits
+constexpr double kRoomBetween = 2.0;      // these may move so much farther than the given ones
+constexpr Eigen::Index kMostBetween = 8;  // of these, for each point
+constexpr double kSpanRadii = 0.5;        // knots of the smoothing spline need not lie closer
+constexpr int kMostSpans = 20000;         // of one branch
+constexpr double kLeastNoise = 1e-3;      // in mean radii: far below any voxel, above rounding
+// Decades by which a branch's strength differs from its tree's: noise is much the same everywhere,
+// how radii change is not.
+constexpr double kPositionPrior = 0.5;
+constexpr double kRadiusPrior = 1.0;
+
+// No radius changes by more than this part of itself plus half its difference to its neighbours.
+constexpr double kRadiusChange = 0.1;
+constexpr int kRadiusTrials = 24;  // of ever weaker smoothing
+
+constexpr int kRounds = 30;            // of stiffening sharp bends
+constexpr int kAlternations = 12;      // between spline and largest move, in each round
+constexpr double kInsideLimit = 0.95;  // of the largest move: what alternation leaves over is less
+constexpr double kHiddenBends = 0.5;   // what a bend inside a junction counts
+constexpr double kMoveBroken = 1e9;    // what a broken move limit counts against bends
+constexpr double kMostStiffness = 1e4;
+constexpr double kMostForce = 1e4;
+constexpr int kDenseSamples = 12;     // of the final path, for each span of the smoothing spline
+constexpr int kRefinements = 12;      // halvings of the final path's spans
+constexpr int kBendSamples = 8;       // of curvature, for each span
+constexpr double kRoomInBends = 0.9;  // curvature times radius a radius is reduced to
+constexpr double kLeastFactor = 0.5;  // radii are not reduced below this part of themselves
 
 struct Samples {
   Eigen::MatrixXd points;  // one row a sample
   Eigen::VectorXd radii;
   Eigen::VectorXd parameters;
+  Eigen::VectorXd weights;
   Eigen::VectorXd radius_weights;
 };
 
@@ -42,29 +65,59 @@ bool jumps(double r0, double r1, double r2) {
   return std::abs(std::log(r0 / r1)) > kJump + 3 * std::abs(std::log(r1 / r2));
 }
 
-Samples samples_of(const CenterlineBranch& branch, bool trust_start, bool trust_end) {
+// The branch's points, and points between them that only the largest move knows (weight 0): a curve
+// between far points must not leave the line that joins them either. A branch of very few points
+// gets points with weight, for a spline to stand on.
+Samples samples_of(const CenterlineBranch& branch, bool start_is_junction, bool end_is_junction) {
   const Eigen::Index given = branch.points_mm.cols();
-  const Eigen::Index parts =
-      given >= kFewestSamples ? 1 : (kFewestSamples - 1 + given - 2) / (given - 1);
-  const Eigen::Index count = (given - 1) * parts + 1;
+  std::vector<Eigen::Index> parts(static_cast<std::size_t>(given - 1), 1);
+  Eigen::Index count = given;
+  const Eigen::Index fewest =
+      given >= kFewestSamples ? 1 : (kFewestSamples + given - 3) / (given - 1);
+  Eigen::Index room = kMostBetween * given;
+  for (Eigen::Index i = 0; i + 1 < given; ++i) {
+    const double length = (branch.points_mm.col(i + 1) - branch.points_mm.col(i)).norm();
+    const double radius = 0.5 * (branch.radii_mm(i) + branch.radii_mm(i + 1));
+    const double wanted = std::ceil(length / (kGapRadii * radius));
+    const auto more = static_cast<Eigen::Index>(std::min(wanted - 1, static_cast<double>(room)));
+    parts[static_cast<std::size_t>(i)] = std::max(fewest, 1 + std::max<Eigen::Index>(0, more));
+    room -= std::max<Eigen::Index>(0, more);
+    count += parts[static_cast<std::size_t>(i)] - 1;
+  }
   Samples s;
   s.points.resize(count, 3);
   s.radii.resize(count);
   s.parameters.resize(count);
-  s.radius_weights = Eigen::VectorXd::Ones(count);
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const Eigen::Index i = std::min(k / parts, given - 2);
-    const double t = static_cast<double>(k - i * parts) / static_cast<double>(parts);
-    s.points.row(k) =
-        ((1 - t) * branch.points_mm.col(i) + t * branch.points_mm.col(i + 1)).transpose();
-    s.radii(k) = (1 - t) * branch.radii_mm(i) + t * branch.radii_mm(i + 1);
-    s.parameters(k) =
-        k == 0 ? 0.0 : s.parameters(k - 1) + (s.points.row(k) - s.points.row(k - 1)).norm();
+  s.weights = Eigen::VectorXd::Zero(count);
+  Eigen::Index filled = 0;
+  const auto add = [&](Eigen::Index i, double t, double weight) {
+    const Eigen::Index j = std::min(i + 1, given - 1);
+    s.points.row(filled) =
+        ((1 - t) * branch.points_mm.col(i) + t * branch.points_mm.col(j)).transpose();
+    s.radii(filled) = (1 - t) * branch.radii_mm(i) + t * branch.radii_mm(j);
+    s.weights(filled) = weight;
+    s.parameters(filled) =
+        filled == 0
+            ? 0.0
+            : s.parameters(filled - 1) + (s.points.row(filled) - s.points.row(filled - 1)).norm();
+    ++filled;
+  };
+  for (Eigen::Index i = 0; i + 1 < given; ++i) {
+    const Eigen::Index n = parts[static_cast<std::size_t>(i)];
+    for (Eigen::Index k = 0; k < n; ++k) {
+      add(i, static_cast<double>(k) / static_cast<double>(n), k == 0 || fewest > 1 ? 1.0 : 0.0);
+    }
   }
+  add(given - 1, 0.0, 1.0);
+  s.radius_weights = s.weights;
   const auto& r = branch.radii_mm;
+  if (given == 3) {  // the middle one decides
+    if (start_is_junction && jumps(r(0), r(1), r(1))) s.radius_weights(0) = 0;
+    if (end_is_junction && jumps(r(2), r(1), r(1))) s.radius_weights(count - 1) = 0;
+  }
   if (given > 3) {
-    if (!trust_start && jumps(r(0), r(1), r(2))) s.radius_weights(0) = 0;
-    if (!trust_end && jumps(r(given - 1), r(given - 2), r(given - 3))) {
+    if (start_is_junction && jumps(r(0), r(1), r(2))) s.radius_weights(0) = 0;
+    if (end_is_junction && jumps(r(given - 1), r(given - 2), r(given - 3))) {
       s.radius_weights(count - 1) = 0;
     }
   }
@@ -78,161 +131,345 @@ int span_count(const Samples& s) {
   return static_cast<int>(std::clamp(std::min(by_radius, by_samples), 2.0, double{kMostSpans}));
 }
 
-Eigen::MatrixXd two_rows(const Vec3& a, const Vec3& b) {
-  Eigen::MatrixXd rows(2, 3);
-  rows.row(0) = a.transpose();
-  rows.row(1) = b.transpose();
-  return rows;
-}
-
-double bend(const BSplineCurve<4>& path, double s) {
-  const Vec3 d1 = path.at(s, 1).head<3>();
-  const Vec3 d2 = path.at(s, 2).head<3>();
+double bend_of(const Vec3& d1, const Vec3& d2, double radius) {
   const double speed = d1.norm();
   if (!(speed > 0)) return std::numeric_limits<double>::infinity();
-  return d1.cross(d2).norm() / (speed * speed * speed) * path.at(s)(3);
+  return d1.cross(d2).norm() / (speed * speed * speed) * radius;
 }
+
+// A quadratic through the least value and its neighbours.
+double parabola_vertex(const Eigen::VectorXd& v, Eigen::Index k) {
+  if (k == 0 || k + 1 >= v.size()) return static_cast<double>(k);
+  const double below = v(k - 1) - v(k);
+  const double above = v(k + 1) - v(k);
+  if (!(below + above > 0) || !std::isfinite(below + above)) return static_cast<double>(k);
+  return static_cast<double>(k) + 0.5 * (below - above) / (below + above);
+}
+
+// The dense curve and its radius, sampled for the final path.
+struct DensePath {
+  Eigen::VectorXd s;       // arc length
+  Eigen::MatrixXd values;  // x, y, z, radius
+  Eigen::VectorXd bends;   // curvature times radius
+};
 
 }  // namespace
 
+double best_grid_position(const Eigen::VectorXd& criteria) {
+  Eigen::Index least = 0;
+  criteria.minCoeff(&least);
+  return parabola_vertex(criteria, least);
+}
+
 struct BranchSmoother::State {
-  State(const CenterlineBranch& branch, bool trust_start, bool trust_end,
-        const BranchSmootherOptions& opts)
+  State(const CenterlineBranch& branch, const BranchEnd& start_end, const BranchEnd& end_end,
+        double tree_radius, const BranchSmootherOptions& opts)
       : options(opts),
-        samples(samples_of(branch, trust_start, trust_end)),
+        start(start_end),
+        end(end_end),
+        samples(samples_of(branch, start.is_junction, end.is_junction)),
         knots(KnotVector::clamped(
             kDegree,
             uniform(samples.parameters(samples.parameters.size() - 1), span_count(samples)))),
-        position(knots, samples.parameters, samples.points,
-                 Eigen::VectorXd::Ones(samples.parameters.size())),
+        position(knots, samples.parameters, samples.points, samples.weights),
         log_radius(knots, samples.parameters, samples.radii.array().log().matrix(),
                    samples.radius_weights) {
-    position_strength = position.best_strength(kLeastNoise * samples.radii.mean());
-    log_radius_coefficients = log_radius.solve(log_radius.best_strength(kLeastNoise));
-    free = position.solve(position_strength);
-  }
-
-  // How far the samples lie from the curve at their parameters, in mm and in radii.
-  std::pair<double, double> moves(const Eigen::MatrixXd& C) const {
-    const BSplineCurve<3> curve(knots, C.transpose());
-    std::pair<double, double> most{0, 0};
-    for (Eigen::Index i = 0; i < samples.parameters.size(); ++i) {
-      const double d = (curve.at(samples.parameters(i)) - samples.points.row(i).transpose()).norm();
-      most.first = std::max(most.first, d);
-      most.second = std::max(most.second, d / samples.radii(i));
+    const double mean = samples.radii.mean();
+    // Noise of a given size in the tree against curvatures of the order of one over the radius,
+    // that stay alike over a radius; and relative noise of the radii against changes over a radius.
+    position_unit = tree_radius * tree_radius * mean;
+    radius_unit = mean * mean * mean;
+    position_criteria.resize(kStrengthCount);
+    radius_criteria.resize(kStrengthCount);
+    for (int k = 0; k < kStrengthCount; ++k) {
+      position_criteria(k) = position.criterion(strength(position_unit, k), kLeastNoise * mean);
+      radius_criteria(k) = log_radius.criterion(strength(radius_unit, k), kLeastNoise);
     }
-    return most;
+    // Radii that do not vary say nothing of how much they would.
+    if (samples.radii.maxCoeff() <= (1 + kLeastNoise) * samples.radii.minCoeff()) {
+      radius_criteria.setZero();
+    }
   }
 
-  double radius_at(double t) const {
-    return std::exp(BSplineCurve<1>(knots, log_radius_coefficients.transpose()).at(t)(0));
+  static double strength(double unit, double grid_position) {
+    return unit * std::pow(10.0, kFirstStrength + kStrengthStep * grid_position);
   }
 
-  // The same curve with its radius as one path in near arc length, with as few spans as the
-  // tolerance allows.
-  BSplineCurve<4> path_of(const Eigen::MatrixXd& C) const {
-    const BSplineCurve<3> curve(knots, C.transpose());
-    const BSplineCurve<1> log_r(knots, log_radius_coefficients.transpose());
-    const int spans = position.span_count();
-    const int count = std::max(8 * spans, 64);
-    const double last = knots.last();
-    Eigen::VectorXd s(count + 1);
-    Eigen::MatrixXd values(count + 1, 4);
-    constexpr std::array<double, 3> kAt = {0.1127016653792583, 0.5, 0.8872983346207417};
-    constexpr std::array<double, 3> kWeight = {5.0 / 18, 8.0 / 18, 5.0 / 18};
-    for (int k = 0; k <= count; ++k) {
-      const double t = last * k / count;
-      if (k == 0) s(0) = 0;
-      double step = 0;
-      for (std::size_t g = 0; k > 0 && g < kAt.size(); ++g) {
-        step += kWeight[g] * curve.at(t - last / count * (1 - kAt[g]), 1).norm();
+  // The branch's verdict with a Gaussian prior around the tree's.
+  static double drawn_to(double of_tree, double width, Eigen::VectorXd criteria) {
+    for (Eigen::Index k = 0; k < criteria.size(); ++k) {
+      const double off = (static_cast<double>(k) - of_tree) * kStrengthStep / width;
+      criteria(k) += off * off;
+    }
+    return best_grid_position(criteria);
+  }
+
+  // Weakens the smoothing of the radii until none changes too much.
+  Eigen::MatrixXd smooth_log_radius(double radius_strength) const {
+    const Eigen::VectorXd y = samples.radii.array().log();
+    const Eigen::Index last = y.size() - 1;
+    Eigen::MatrixXd C;
+    for (int trial = 0; trial < kRadiusTrials; ++trial, radius_strength *= 0.5) {
+      C = log_radius.solve(radius_strength);
+      const Eigen::VectorXd change = (log_radius.values_at_samples(C).col(0) - y).cwiseAbs();
+      bool kept = true;
+      for (Eigen::Index i = 0; i <= last && kept; ++i) {
+        const double before = i > 0 ? std::abs(y(i) - y(i - 1)) : 0.0;
+        const double after = i < last ? std::abs(y(i) - y(i + 1)) : 0.0;
+        kept = samples.radius_weights(i) == 0 ||
+               change(i) <= kRadiusChange + 0.5 * std::max(before, after);
       }
-      if (k > 0) s(k) = s(k - 1) + step * last / count;
-      values.row(k).head<3>() = curve.at(t).transpose();
-      values(k, 3) = std::exp(log_r.at(t)(0));
+      if (kept) break;
     }
-    for (int n = 2;; n = std::max(n + 1, n * 5 / 4)) {
-      const bool full = n >= spans + 4;
-      const KnotVector fewer =
-          KnotVector::clamped(kDegree, uniform(s(count), full ? spans + 4 : n));
-      const PenalisedSpline fit(fewer, s, values, Eigen::VectorXd::Ones(count + 1));
-      Eigen::MatrixXd ends(2, 4);
-      ends.row(0) = values.row(0);
-      ends.row(1) = values.row(count);
-      constexpr double kNoPenalty = 1e-9;  // times length^3: regularises, does not smooth
-      const double length = s(count);
-      BSplineCurve<4> path(
-          fewer,
-          fit.solve(kNoPenalty * length * length * length / std::pow(n, 4), ends).transpose());
-      double worst = 0;
-      for (int k = 0; k <= count; ++k) {
-        const Vec4 d = path.at(s(k)) - values.row(k).transpose();
-        worst = std::max(worst, std::max(d.head<3>().norm(), std::abs(d(3))) / values(k, 3));
-      }
-      if (full || worst <= options.path_tolerance) return path;
-    }
+    return C;
   }
+
+  bool is_visible(double t) const {
+    return t >= start.hidden_mm && t <= knots.last() - end.hidden_mm;
+  }
+
+  DensePath dense(const Eigen::MatrixXd& C) const;
+  double reduce_radius_in_bends(DensePath& path) const;
+  BSplineCurve<4> compressed(const DensePath& path) const;
+  Eigen::VectorXd bends_of_spans(const Eigen::MatrixXd& C) const;
+  Eigen::MatrixXd follow_rules(const Eigen::MatrixXd& ends) const;
 
   BranchSmootherOptions options;
+  BranchEnd start;
+  BranchEnd end;
   Samples samples;
   KnotVector knots;
   PenalisedSpline position;
   PenalisedSpline log_radius;
+  double position_unit = 0;
+  double radius_unit = 0;
+  Eigen::VectorXd position_criteria;
+  Eigen::VectorXd radius_criteria;
   double position_strength = 0;
   Eigen::MatrixXd log_radius_coefficients;
-  Eigen::MatrixXd free;
 };
 
-BranchSmoother::BranchSmoother(const CenterlineBranch& branch, bool trust_start, bool trust_end,
+DensePath BranchSmoother::State::dense(const Eigen::MatrixXd& C) const {
+  const BSplineCurve<3> curve(knots, C.transpose());
+  const BSplineCurve<1> log_r(knots, log_radius_coefficients.transpose());
+  const int count = std::max(kDenseSamples * position.span_count(), 128);
+  const double step = knots.last() / count;
+  DensePath path{Eigen::VectorXd::Zero(count + 1), Eigen::MatrixXd(count + 1, 4),
+                 Eigen::VectorXd::Zero(count + 1)};
+  constexpr std::array<double, 3> kAt = {0.1127016653792583, 0.5, 0.8872983346207417};
+  constexpr std::array<double, 3> kWeight = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  for (int k = 0; k <= count; ++k) {
+    const double t = k == count ? knots.last() : step * k;
+    double speed = 0;
+    for (std::size_t g = 0; k > 0 && g < kAt.size(); ++g) {
+      speed += kWeight[g] * curve.at(t - step * (1 - kAt[g]), 1).norm();
+    }
+    if (k > 0) path.s(k) = path.s(k - 1) + step * speed;
+    path.values.row(k).head<3>() = curve.at(t).transpose();
+    path.values(k, 3) = std::exp(log_r.at(t)(0));
+    if (is_visible(t)) path.bends(k) = bend_of(curve.at(t, 1), curve.at(t, 2), path.values(k, 3));
+  }
+  return path;
+}
+
+// Where a bend is still too sharp for the radius, the radius gives way, over two radii to either
+// side.
+double BranchSmoother::State::reduce_radius_in_bends(DensePath& path) const {
+  const Eigen::Index count = path.s.size();
+  Eigen::VectorXd factor = Eigen::VectorXd::Ones(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    if (path.bends(k) <= 1.0 || path.bends(k) * kLeastFactor > kRoomInBends) continue;
+    const double least = kRoomInBends / path.bends(k);
+    const double reach = 2 * path.values(k, 3);
+    for (const Eigen::Index step : {Eigen::Index{-1}, Eigen::Index{1}}) {
+      for (Eigen::Index j = k; j >= 0 && j < count; j += step) {
+        const double x = std::abs(path.s(j) - path.s(k)) / reach;
+        if (x >= 1) break;
+        factor(j) = std::min(factor(j), least + (1 - least) * x * x * (3 - 2 * x));
+      }
+    }
+  }
+  path.values.col(3).array() *= factor.array();
+  path.bends.array() *= factor.array();
+  return factor.minCoeff();
+}
+
+// The path with few spans: those on which it misses the tolerance are halved.
+BSplineCurve<4> BranchSmoother::State::compressed(const DensePath& dense) const {
+  const Eigen::Index last = dense.s.size() - 1;
+  const double length = dense.s(last);
+  Eigen::MatrixXd ends(2, 4);
+  ends.row(0) = dense.values.row(0);
+  ends.row(1) = dense.values.row(last);
+  std::vector<double> breaks = uniform(length, 2);
+  for (int round = 0;; ++round) {
+    const KnotVector knots_now = KnotVector::clamped(kDegree, breaks);
+    const PenalisedSpline fit(knots_now, dense.s, dense.values, Eigen::VectorXd::Ones(last + 1));
+    // Keeps the system definite without smoothing: far below the data, at the scale of the spans.
+    const double strength = 1e-9 * std::pow(length / static_cast<double>(breaks.size() - 1), 3);
+    const Eigen::MatrixXd C = fit.solve(strength, ends);
+    const Eigen::MatrixXd off = fit.values_at_samples(C) - dense.values;
+    std::vector<double> finer;
+    Eigen::Index k = 0;
+    for (std::size_t b = 0; b + 1 < breaks.size(); ++b) {
+      finer.push_back(breaks[b]);
+      const Eigen::Index first = k;
+      double worst = 0;
+      for (; k <= last && (dense.s(k) < breaks[b + 1] || b + 2 == breaks.size()); ++k) {
+        const double error = std::max(off.row(k).head<3>().norm(), std::abs(off(k, 3)));
+        worst = std::max(worst, error / dense.values(k, 3));
+      }
+      // A half must keep enough samples to stand on.
+      const bool can_halve = k - first >= 2 * kDegree;
+      if (worst > options.path_tolerance && can_halve) {
+        finer.push_back(0.5 * (breaks[b] + breaks[b + 1]));
+      }
+    }
+    finer.push_back(length);
+    if (finer.size() == breaks.size() || round == kRefinements) {
+      return BSplineCurve<4>(knots_now, C.transpose());
+    }
+    breaks = std::move(finer);
+  }
+}
+
+Eigen::VectorXd BranchSmoother::State::bends_of_spans(const Eigen::MatrixXd& C) const {
+  const BSplineCurve<3> curve(knots, C.transpose());
+  const BSplineCurve<1> log_r(knots, log_radius_coefficients.transpose());
+  Eigen::VectorXd bends = Eigen::VectorXd::Zero(position.span_count());
+  for (int k = 0; k < position.span_count(); ++k) {
+    const double a = position.breaks()[static_cast<std::size_t>(k)];
+    const double width = position.breaks()[static_cast<std::size_t>(k) + 1] - a;
+    for (int i = 0; i <= kBendSamples; ++i) {
+      const double t = a + width * i / kBendSamples;
+      const double bend = bend_of(curve.at(t, 1), curve.at(t, 2), std::exp(log_r.at(t)(0)));
+      bends(k) = std::max(bends(k), is_visible(t) ? bend : kHiddenBends * bend);
+    }
+  }
+  return bends;
+}
+
+// The spline whose samples keep the largest move, stiffened span by span where it bends too
+// sharply. For a given stiffness it is the minimiser of misfit plus bending over all curves that
+// keep the largest move, found by the alternating direction method of multipliers: Q are the
+// samples' places inside their balls, U the scaled multipliers (Boyd et al. 2011, Found. Trends
+// Mach. Learn. 3).
+Eigen::MatrixXd BranchSmoother::State::follow_rules(const Eigen::MatrixXd& ends) const {
+  PenalisedSpline spline = position;
+  const Eigen::MatrixXd& P = samples.points;
+  const Eigen::VectorXd& W = samples.weights;
+  Eigen::VectorXd limit = options.largest_move * samples.radii;
+  for (Eigen::Index i = 0; i < limit.size(); ++i) limit(i) *= W(i) > 0 ? 1.0 : kRoomBetween;
+  Eigen::VectorXd stiffness = Eigen::VectorXd::Ones(spline.span_count());
+  Eigen::MatrixXd C = spline.solve(position_strength, ends);
+  Eigen::MatrixXd best;
+  double best_excess = std::numeric_limits<double>::infinity();
+  // Returns whether both rules hold; remembers the trial that breaks them least, moves first.
+  const auto judge = [&](const Eigen::VectorXd& bends) {
+    const Eigen::VectorXd moves = (spline.values_at_samples(C) - P).rowwise().norm();
+    const double move_excess = std::max(0.0, moves.cwiseQuotient(limit).maxCoeff() - 1.0);
+    const double bend_excess = std::max(0.0, bends.maxCoeff() / options.largest_bend - 1.0);
+    const double excess = move_excess > 0 ? kMoveBroken * (1 + move_excess) : bend_excess;
+    if (excess < best_excess) {
+      best = C;
+      best_excess = excess;
+    }
+    return excess <= 0;
+  };
+  Eigen::VectorXd bends = bends_of_spans(C);
+  if (judge(bends)) return best;
+  Eigen::MatrixXd F = spline.values_at_samples(C);
+  Eigen::MatrixXd U = Eigen::MatrixXd::Zero(P.rows(), 3);
+  Eigen::VectorXd rho = Eigen::VectorXd::Zero(P.rows());
+  const double spacing = knots.last() / static_cast<double>(P.rows() - 1);
+  double strength = position_strength;
+  for (int round = 0; round < kRounds; ++round) {
+    // The force that moves one sample against the bending of its neighbourhood: multipliers of that
+    // size converge in few steps whatever the strength.
+    const double force = strength / (spacing * spacing * spacing);
+    for (Eigen::Index i = 0; i < P.rows(); ++i) {
+      const int span =
+          std::min(knots.span(samples.parameters(i)) - kDegree, spline.span_count() - 1);
+      const double now = std::clamp(force, 4.0, kMostForce) * stiffness(span);
+      if (rho(i) > 0) U.row(i) *= rho(i) / now;
+      rho(i) = now;
+    }
+    spline.set_weights(W + rho);
+    spline.set_stiffness(stiffness);
+    for (int step = 0; step < kAlternations; ++step) {
+      Eigen::MatrixXd Q = F + U;
+      for (Eigen::Index i = 0; i < P.rows(); ++i) {
+        const Eigen::RowVector3d off = Q.row(i) - P.row(i);
+        const double inside = kInsideLimit * limit(i);
+        if (off.norm() > inside) Q.row(i) = P.row(i) + inside / off.norm() * off;
+      }
+      const Eigen::MatrixXd target =
+          (W + rho).cwiseInverse().asDiagonal() * (W.asDiagonal() * P + rho.asDiagonal() * (Q - U));
+      spline.set_values(target);
+      C = spline.solve(strength, ends);
+      F = spline.values_at_samples(C);
+      U += F - Q;
+    }
+    bends = bends_of_spans(C);
+    if (judge(bends)) break;
+    if (best_excess >= kMoveBroken) {  // too stiff a spline for its limits: give in
+      strength *= 0.25;
+      continue;
+    }
+    for (int k = 0; k < spline.span_count(); ++k) {
+      if (bends(k) <= options.largest_bend) continue;
+      for (int j = std::max(0, k - 1); j <= std::min(spline.span_count() - 1, k + 1); ++j) {
+        stiffness(j) = std::min(kMostStiffness, stiffness(j) * (j == k ? 1.6 : 1.25));
+      }
+    }
+  }
+  return best;
+}
+
+BranchSmoother::BranchSmoother(const CenterlineBranch& branch, const BranchEnd& start,
+                               const BranchEnd& end, double tree_radius_mm,
                                const BranchSmootherOptions& options) {
   EXPECTS(branch.points_mm.cols() >= 2 && branch.radii_mm.minCoeff() > 0);
-  state_ = std::make_unique<State>(branch, trust_start, trust_end, options);
+  state_ = std::make_unique<State>(branch, start, end, tree_radius_mm, options);
 }
 
 BranchSmoother::~BranchSmoother() = default;
 BranchSmoother::BranchSmoother(BranchSmoother&&) noexcept = default;
 BranchSmoother& BranchSmoother::operator=(BranchSmoother&&) noexcept = default;
 
-std::pair<Vec3, Vec3> BranchSmoother::free_ends() const {
-  return {state_->free.row(0).transpose(), state_->free.bottomRows(1).transpose()};
+const Eigen::VectorXd& BranchSmoother::position_criteria() const {
+  return state_->position_criteria;
 }
 
-std::pair<double, double> BranchSmoother::end_radii_mm() const {
-  return {state_->radius_at(state_->knots.first()), state_->radius_at(state_->knots.last())};
+const Eigen::VectorXd& BranchSmoother::radius_criteria() const { return state_->radius_criteria; }
+
+void BranchSmoother::choose_strengths(double position_of_tree, double radius_of_tree) {
+  State& s = *state_;
+  s.position_strength = State::strength(
+      s.position_unit, State::drawn_to(position_of_tree, kPositionPrior, s.position_criteria));
+  s.log_radius_coefficients = s.smooth_log_radius(State::strength(
+      s.radius_unit, State::drawn_to(radius_of_tree, kRadiusPrior, s.radius_criteria)));
+}
+
+CondensedEnds BranchSmoother::condensed_ends() const {
+  return state_->position.condensed_ends(state_->position_strength);
 }
 
 SmoothPath BranchSmoother::smooth(const Vec3& start, const Vec3& end) const {
-  PenalisedSpline position = state_->position;
-  const Eigen::MatrixXd ends = two_rows(start, end);
-  double strength = state_->position_strength;
-  Eigen::MatrixXd C = position.solve(strength, ends);
-  for (int k = 0; k < kRelaxations && state_->moves(C).second > state_->options.largest_move; ++k) {
-    strength *= 0.25;
-    C = position.solve(strength, ends);
-  }
-  const auto sharpest = [](const BSplineCurve<4>& path) {
-    double most = 0;
-    const int count = path.knots().control_point_count() * kBendSamples;
-    for (int i = 0; i <= count; ++i) {
-      most = std::max(most, bend(path, path.knots().last() * i / count));
-    }
-    return most;
-  };
-  SmoothPath found{state_->path_of(C), 0, 0, 0};
-  found.sharpest_bend = sharpest(found.path);
-  for (int k = 0; k < kStiffenings && found.sharpest_bend > state_->options.largest_bend; ++k) {
-    strength *= 2;
-    const Eigen::MatrixXd stiffer = position.solve(strength, ends);
-    if (state_->moves(stiffer).second > state_->options.largest_move) break;
-    BSplineCurve<4> path = state_->path_of(stiffer);
-    const double now = sharpest(path);
-    if (now >= found.sharpest_bend) continue;
-    C = stiffer;
-    found.path = std::move(path);
-    found.sharpest_bend = now;
-  }
-  std::tie(found.largest_move_mm, found.largest_move_radii) = state_->moves(C);
-  return found;
+  EXPECTS(state_->position_strength > 0);
+  Eigen::MatrixXd ends(2, 3);
+  ends.row(0) = start.transpose();
+  ends.row(1) = end.transpose();
+  const Eigen::MatrixXd C = state_->follow_rules(ends);
+  DensePath dense = state_->dense(C);
+  const double factor = state_->reduce_radius_in_bends(dense);
+  const Samples& samples = state_->samples;
+  const Eigen::VectorXd moves = (state_->position.values_at_samples(C) - samples.points)
+                                    .rowwise()
+                                    .norm()
+                                    .cwiseProduct(samples.weights.cwiseSign());
+  return SmoothPath{state_->compressed(dense), moves.maxCoeff(),
+                    moves.cwiseQuotient(samples.radii).maxCoeff(), dense.bends.maxCoeff(), factor};
 }
 
 }  // namespace angiospline

@@ -59,44 +59,83 @@ void solve_band(const SymmetricBand& L, Eigen::MatrixXd& B) {
 
 PenalisedSpline::PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd& parameters,
                                  const Eigen::MatrixXd& values, const Eigen::VectorXd& weights)
-    : knots_(knots),
-      breaks_(knots.breakpoints()),
-      parameters_(parameters),
-      values_(values),
-      weights_(weights) {
-  EXPECTS(parameters.size() == values.rows() && weights.size() == values.rows());
+    : knots_(knots), breaks_(knots.breakpoints()), values_(values) {
+  EXPECTS(parameters.size() == values.rows());
   EXPECTS(parameters.size() > kPenaltyOrder && knots.degree() > kPenaltyOrder);
-  const int p = knots.degree();
-  const Eigen::Index n = knots.control_point_count();
-  basis_.resize(parameters.size(), p + 1);
+  basis_.resize(parameters.size(), knots.order());
   first_.resize(static_cast<std::size_t>(parameters.size()));
-  data_ = SymmetricBand::Zero(p + 1, n);
-  right_ = Eigen::MatrixXd::Zero(n, values.cols());
+  int span = -1;
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
-    const BasisValues b = basis_at(knots, parameters(i));
+    span = knots.span(parameters(i), span);
+    const BasisValues b = basis_at(knots, parameters(i), 0, span);
     first_[static_cast<std::size_t>(i)] = b.first;
     basis_.row(i) = b.values.row(0);
-    add_outer(data_, b.first, b.values.row(0), weights(i));
-    right_.middleRows(b.first, p + 1) += weights(i) * b.values.row(0).transpose() * values.row(i);
   }
-  set_stiffness(Eigen::VectorXd::Ones(span_count()));
-}
-
-void PenalisedSpline::set_stiffness(const Eigen::VectorXd& stiffness) {
-  EXPECTS(stiffness.size() == span_count());
-  penalty_ = SymmetricBand::Zero(data_.rows(), data_.cols());
+  const int points = static_cast<int>(kGaussPoints.size());
+  bending_.resize(span_count() * points, knots.order());
   for (int k = 0; k < span_count(); ++k) {
     const double a = breaks_[static_cast<std::size_t>(k)];
     const double width = breaks_[static_cast<std::size_t>(k) + 1] - a;
-    for (std::size_t g = 0; g < kGaussPoints.size(); ++g) {
-      const BasisValues b = basis_at(knots_, a + width * kGaussPoints[g], kPenaltyOrder);
-      add_outer(penalty_, b.first, b.values.row(kPenaltyOrder),
-                stiffness(k) * width * kGaussWeights[g]);
+    for (int g = 0; g < points; ++g) {
+      const double t = a + width * kGaussPoints[static_cast<std::size_t>(g)];
+      bending_.row(k * points + g) = basis_at(knots, t, kPenaltyOrder).values.row(kPenaltyOrder);
+    }
+  }
+  set_weights(weights);
+  set_stiffness(Eigen::VectorXd::Ones(span_count()));
+}
+
+void PenalisedSpline::set_weights(const Eigen::VectorXd& weights) {
+  EXPECTS(weights.size() == values_.rows());
+  weights_ = weights;
+  const Eigen::Index order = basis_.cols();
+  const Eigen::Index n = knots_.control_point_count();
+  data_ = SymmetricBand::Zero(order, n);
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    add_outer(data_, first_[static_cast<std::size_t>(i)], basis_.row(i), weights(i));
+  }
+  collect_right();
+}
+
+void PenalisedSpline::set_values(const Eigen::MatrixXd& values) {
+  EXPECTS(values.rows() == values_.rows() && values.cols() == values_.cols());
+  values_ = values;
+  collect_right();
+}
+
+void PenalisedSpline::collect_right() {
+  right_ = Eigen::MatrixXd::Zero(knots_.control_point_count(), values_.cols());
+  for (Eigen::Index i = 0; i < weights_.size(); ++i) {
+    const int first = first_[static_cast<std::size_t>(i)];
+    for (Eigen::Index k = 0; k < basis_.cols(); ++k) {
+      right_.row(first + k) += weights_(i) * basis_(i, k) * values_.row(i);
     }
   }
 }
 
-SymmetricBand PenalisedSpline::system(double strength) const { return data_ + strength * penalty_; }
+void PenalisedSpline::set_stiffness(const Eigen::VectorXd& stiffness) {
+  EXPECTS(stiffness.size() == span_count());
+  const int points = static_cast<int>(kGaussPoints.size());
+  penalty_ = SymmetricBand::Zero(basis_.cols(), knots_.control_point_count());
+  for (int k = 0; k < span_count(); ++k) {  // clamped, simple or multiple inner knots
+    const double a = breaks_[static_cast<std::size_t>(k)];
+    const double width = breaks_[static_cast<std::size_t>(k) + 1] - a;
+    const int first = knots_.span(a + 0.5 * width) - knots_.degree();
+    for (int g = 0; g < points; ++g) {
+      add_outer(penalty_, first, bending_.row(k * points + g),
+                stiffness(k) * width * kGaussWeights[static_cast<std::size_t>(g)]);
+    }
+  }
+}
+
+Eigen::MatrixXd PenalisedSpline::values_at_samples(const Eigen::MatrixXd& coefficients) const {
+  Eigen::MatrixXd values(values_.rows(), coefficients.cols());
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    values.row(i) =
+        basis_.row(i) * coefficients.middleRows(first_[static_cast<std::size_t>(i)], basis_.cols());
+  }
+  return values;
+}
 
 double PenalisedSpline::criterion(double strength, double least_noise) const {
   SymmetricBand L = system(strength);
@@ -106,11 +145,8 @@ double PenalisedSpline::criterion(double strength, double least_noise) const {
   const double dimensions = static_cast<double>(values_.cols());
   const double samples = static_cast<double>((weights_.array() > 0).count());
   const double count = static_cast<double>(L.cols());
-  double residual = samples * dimensions * least_noise * least_noise;
-  for (Eigen::Index i = 0; i < parameters_.size(); ++i) {
-    const auto here = C.middleRows(first_[static_cast<std::size_t>(i)], basis_.cols());
-    residual += weights_(i) * (values_.row(i) - basis_.row(i) * here).squaredNorm();
-  }
+  const double misfit =
+      weights_.dot((values_ - values_at_samples(C)).rowwise().squaredNorm().matrix());
   double bending = 0;
   for (Eigen::Index j = 0; j < penalty_.cols(); ++j) {
     bending += penalty_(0, j) * C.row(j).squaredNorm();
@@ -118,75 +154,75 @@ double PenalisedSpline::criterion(double strength, double least_noise) const {
       bending += 2 * penalty_(k, j) * C.row(j).dot(C.row(j + k));
     }
   }
+  const double least = samples * dimensions * least_noise * least_noise;
   const double log_det = 2 * L.row(0).array().log().sum();
-  return dimensions * ((samples - kPenaltyOrder) * std::log(residual + strength * bending) +
+  return dimensions * ((samples - kPenaltyOrder) * std::log(misfit + strength * bending + least) +
                        log_det - (count - kPenaltyOrder) * std::log(strength));
 }
 
-double PenalisedSpline::best_strength(double least_noise) const {
-  // The scale on which data and penalty weigh the same; smoothing lengths from well below a span to
-  // well above the curve lie inside ten decades to either side.
-  const double unit = data_.row(0).sum() / penalty_.row(0).sum();
-  const auto value = [&](double e) { return criterion(unit * std::pow(10.0, e), least_noise); };
-  double best = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (int e = -8; e <= 12; ++e) {
-    const double v = value(e);
-    if (v < least) {
-      least = v;
-      best = e;
-    }
+namespace {
+
+// The factor of A; where rounding makes weights of very different sizes indefinite, a diagonal at the
+// size of the rounding is added.
+SymmetricBand factor_of(const SymmetricBand& A) {
+  double shift = std::numeric_limits<double>::epsilon() * A.row(0).maxCoeff();
+  SymmetricBand L = A;
+  for (; !factorise_band(L); shift *= 16) {
+    EXPECTS(std::isfinite(shift));
+    L = A;
+    L.row(0).array() += shift;
   }
-  constexpr double kGolden = 0.6180339887498949;
-  double a = best - 1;
-  double b = best + 1;
-  double x = b - kGolden * (b - a);
-  double y = a + kGolden * (b - a);
-  double fx = value(x);
-  double fy = value(y);
-  while (b - a > 0.02) {  // 5 % of the strength: its effect on the curve is a fourth of that
-    if (fx <= fy) {
-      b = y;
-      y = x;
-      fy = fx;
-      x = b - kGolden * (b - a);
-      fx = value(x);
-    } else {
-      a = x;
-      x = y;
-      fx = fy;
-      y = a + kGolden * (b - a);
-      fy = value(y);
-    }
-  }
-  return unit * std::pow(10.0, 0.5 * (a + b));
+  return L;
 }
+
+// Makes the first and last unknown known: their columns go to the right-hand side.
+void fix_ends(SymmetricBand& A, Eigen::MatrixXd& B, const Eigen::MatrixXd& ends) {
+  const Eigen::Index n = A.cols();
+  for (Eigen::Index k = 1; k <= std::min(A.rows() - 1, n - 1); ++k) {
+    B.row(k) -= A(k, 0) * ends.row(0);
+    A(k, 0) = 0;
+    B.row(n - 1 - k) -= A(k, n - 1 - k) * ends.row(1);
+    A(k, n - 1 - k) = 0;
+  }
+  A(0, 0) = A(0, n - 1) = 1;
+  B.row(0) = ends.row(0);
+  B.row(n - 1) = ends.row(1);
+}
+
+}  // namespace
 
 Eigen::MatrixXd PenalisedSpline::solve(double strength, const Eigen::MatrixXd& ends) const {
   SymmetricBand A = system(strength);
   Eigen::MatrixXd C = right_;
+  if (ends.rows() == 2) fix_ends(A, C, ends);
+  solve_band(factor_of(A), C);
+  return C;
+}
+
+CondensedEnds PenalisedSpline::condensed_ends(double strength) const {
+  const SymmetricBand A = system(strength);
   const Eigen::Index n = A.cols();
   const Eigen::Index p = A.rows() - 1;
-  if (ends.rows() ==
-      2) {  // clamped: the end coefficients are the end values; move them to the right
-    for (Eigen::Index k = 1; k <= std::min(p, n - 1); ++k) {
-      C.row(k) -= A(k, 0) * ends.row(0);
-      A(k, 0) = 0;
-      C.row(n - 1 - k) -= A(k, n - 1 - k) * ends.row(1);
-      A(k, n - 1 - k) = 0;
-    }
-    A(0, 0) = A(0, n - 1) = 1;
-    C.row(0) = ends.row(0);
-    C.row(n - 1) = ends.row(1);
+  const Eigen::Index dimensions = right_.cols();
+  // Columns: the response to a unit first value, to a unit last value, and to the data.
+  Eigen::MatrixXd X(n, 2 + dimensions);
+  X << Eigen::MatrixXd::Zero(n, 2), right_;
+  Eigen::MatrixXd ends = Eigen::MatrixXd::Zero(2, 2 + dimensions);
+  ends(0, 0) = ends(1, 1) = 1;
+  SymmetricBand L = A;
+  fix_ends(L, X, ends);
+  solve_band(factor_of(L), X);
+  CondensedEnds condensed;
+  condensed.right.resize(2, dimensions);
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(2, X.cols());  // the end rows of A times X
+  for (Eigen::Index k = 0; k <= std::min(p, n - 1); ++k) {
+    rows.row(0) += A(k, 0) * X.row(k);
+    rows.row(1) += A(k, n - 1 - k) * X.row(n - 1 - k);
   }
-  const bool positive = factorise_band(A);
-  EXPECTS(positive);
-  solve_band(A, C);
-  if (ends.rows() == 2) {
-    C.row(0) = ends.row(0);
-    C.row(n - 1) = ends.row(1);
-  }
-  return C;
+  condensed.matrix = rows.leftCols<2>();
+  condensed.right.row(0) = right_.row(0) - rows.row(0).tail(dimensions);
+  condensed.right.row(1) = right_.row(n - 1) - rows.row(1).tail(dimensions);
+  return condensed;
 }
 
 }  // namespace angiospline

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <optional>
 
+#include <Eigen/SparseCholesky>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
@@ -15,32 +16,70 @@ namespace {
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
-// The mean of where its branches would put a node, thick ones weighing more (by cross-section), no
-// farther than `largest_move` times the thinnest one's radius from where it was.
-struct NodePlace {
-  Vec3 sum = Vec3::Zero();
-  double weight = 0.0;
+constexpr const char* kStage = "smooth centerlines";
+
+// A junction's openings lie farther out than this, in radii of its thickest branch: bends inside do
+// not reach any wall.
+constexpr double kHidden = 1.5;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// The radius of the thickest and of the thinnest branch at each node, just beside it.
+struct NodeRadii {
+  double thickest = 0.0;
   double thinnest = std::numeric_limits<double>::infinity();
-
-  void add(const Vec3& p, double radius) {
-    sum += radius * radius * p;
-    weight += radius * radius;
-    thinnest = std::min(thinnest, radius);
-  }
-
-  Vec3 place(const Vec3& before, double largest_move) const {
-    const Vec3 move = sum / weight - before;
-    const double most = largest_move * thinnest;
-    const double length = move.norm();
-    return length > most ? Vec3(before + most / length * move) : Vec3(before + move);
-  }
 };
+
+std::vector<NodeRadii> radii_at_nodes(const CenterlineTree& tree) {
+  std::vector<NodeRadii> radii(tree.nodes.size());
+  for (const CenterlineBranch& branch : tree.branches) {
+    const auto count = branch.radii_mm.size();
+    const auto add = [&](int node, double r) {
+      radii[index(node)].thickest = std::max(radii[index(node)].thickest, r);
+      radii[index(node)].thinnest = std::min(radii[index(node)].thinnest, r);
+    };
+    add(branch.from, branch.radii_mm(std::min<Eigen::Index>(1, count - 1)));
+    add(branch.to, branch.radii_mm(std::max<Eigen::Index>(0, count - 2)));
+  }
+  return radii;
+}
+
+// Where all branches together put the nodes: the minimum of their condensed problems, one sparse
+// system with a row for each node. No node moves farther than `largest_move` of its thinnest
+// branch.
+void place_nodes(CenterlineTree& tree, const std::vector<std::optional<BranchSmoother>>& smoothers,
+                 const std::vector<NodeRadii>& radii, double largest_move) {
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(tree.nodes.size()), 3);
+  for (std::size_t b = 0; b < smoothers.size(); ++b) {
+    const CondensedEnds ends = smoothers[b]->condensed_ends();
+    const int nodes[2] = {tree.branches[b].from, tree.branches[b].to};
+    for (int i = 0; i < 2; ++i) {
+      right.row(nodes[i]) += ends.right.row(i);
+      for (int j = 0; j < 2; ++j) entries.emplace_back(nodes[i], nodes[j], ends.matrix(i, j));
+    }
+  }
+  Eigen::SparseMatrix<double> A(right.rows(), right.rows());
+  A.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(A);
+  const Eigen::MatrixXd places = solver.solve(right);
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    Vec3& position = tree.nodes[n].position_mm;
+    const Vec3 move = places.row(static_cast<Eigen::Index>(n)).transpose() - position;
+    const double most = largest_move * radii[n].thinnest;
+    if (!move.allFinite()) continue;
+    position += move.norm() > most ? Vec3(most / move.norm() * move) : move;
+  }
+}
 
 }  // namespace
 
 Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const SmoothingOptions& options,
                                         const Progress& progress) {
-  constexpr const char* kStage = "smooth centerlines";
   CleanedTree cleaned = clean_tree(tree);
   SmoothedTree result{std::move(cleaned.tree), {}, 0.0, std::move(cleaned.warnings)};
   std::vector<CenterlineBranch>& branches = result.tree.branches;
@@ -65,24 +104,30 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
     });
     return !progress.should_stop();
   };
+  const std::vector<NodeRadii> radii = radii_at_nodes(result.tree);
+  std::vector<double> mean_radii;
+  for (const CenterlineBranch& branch : branches) mean_radii.push_back(branch.radii_mm.mean());
+  const double tree_radius = median(mean_radii);
   if (!for_each_branch(0.0, [&](std::size_t b) {
-        const CenterlineBranch& branch = branches[b];
-        smoothers[b].emplace(branch, at[index(branch.from)].size() == 1,
-                             at[index(branch.to)].size() == 1, smoothing);
+        const auto end_at = [&](int node) {
+          const bool is_junction = at[index(node)].size() > 2;
+          return BranchEnd{is_junction, is_junction ? kHidden * radii[index(node)].thickest : 0.0};
+        };
+        smoothers[b].emplace(branches[b], end_at(branches[b].from), end_at(branches[b].to),
+                             tree_radius, smoothing);
       })) {
     return fail(cancelled(kStage));
   }
-  std::vector<NodePlace> places(result.tree.nodes.size());
-  for (std::size_t b = 0; b < branches.size(); ++b) {
-    const auto [start, end] = smoothers[b]->free_ends();
-    const auto [start_radius, end_radius] = smoothers[b]->end_radii_mm();
-    places[index(branches[b].from)].add(start, start_radius);
-    places[index(branches[b].to)].add(end, end_radius);
+  Eigen::VectorXd position_criteria = Eigen::VectorXd::Zero(kStrengthCount);
+  Eigen::VectorXd radius_criteria = Eigen::VectorXd::Zero(kStrengthCount);
+  for (const auto& smoother : smoothers) {
+    position_criteria += smoother->position_criteria();
+    radius_criteria += smoother->radius_criteria();
   }
-  for (std::size_t n = 0; n < places.size(); ++n) {
-    CenterlineNode& node = result.tree.nodes[n];
-    node.position_mm = places[n].place(node.position_mm, 0.5 * options.largest_move);
-  }
+  const double position_of_tree = best_grid_position(position_criteria);
+  const double radius_of_tree = best_grid_position(radius_criteria);
+  for (auto& smoother : smoothers) smoother->choose_strengths(position_of_tree, radius_of_tree);
+  place_nodes(result.tree, smoothers, radii, options.largest_move);
   std::vector<std::optional<SmoothPath>> paths(branches.size());
   if (!for_each_branch(0.5, [&](std::size_t b) {
         paths[b] = smoothers[b]->smooth(result.tree.nodes[index(branches[b].from)].position_mm,
@@ -95,10 +140,15 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
     branches[b].points_mm.col(0) = result.tree.nodes[index(branches[b].from)].position_mm;
     branches[b].points_mm.rightCols(1) = result.tree.nodes[index(branches[b].to)].position_mm;
     result.largest_move_mm = std::max(result.largest_move_mm, paths[b]->largest_move_mm);
+    if (paths[b]->radius_reduced_to < 1.0) {
+      result.warnings.push_back(fmt::format(
+          "branch {} bends more sharply than its radius allows: radius reduced to {:.0f} % there",
+          branches[b].name, 100 * paths[b]->radius_reduced_to));
+    }
     if (paths[b]->sharpest_bend > 1.0) {
       result.warnings.push_back(
           fmt::format("branch {} bends more sharply than its radius allows (curvature times radius "
-                      "{:.2g}); its "
+                      "{:.2g}): its "
                       "wall may fold there",
                       branches[b].name, paths[b]->sharpest_bend));
     }
