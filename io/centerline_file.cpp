@@ -8,6 +8,7 @@
 #include "io/csv_centerline.h"
 #include "io/swc_file.h"
 #include "io/text_file.h"
+#include "io/tree_definition.h"
 
 namespace angiospline {
 namespace {
@@ -139,9 +140,10 @@ Result<CenterlineTree> read_centerline_file(const std::filesystem::path& path,
   Parser parse = nullptr;
   if (suffix == ".swc" || suffix == ".eswc") parse = parse_swc;
   if (suffix == ".csv" || suffix == ".tsv" || suffix == ".txt") parse = parse_csv_centerline;
+  if (suffix == ".tree") parse = parse_tree_definition;
   if (parse == nullptr) {
     return fail({ErrorKind::kBadInput, "not a known format of centerlines", path.string(),
-                 fmt::format("'{}'", suffix), "the suffix is one of .swc .csv .tsv .txt"});
+                 fmt::format("'{}'", suffix), "the suffix is one of .swc .csv .tsv .txt .tree"});
   }
   const Result<std::string> text = read_text_file(path);
   if (!text) return fail(text.error());

@@ -23,10 +23,11 @@ struct Columns {
   int id = kNone;
   int parent = kNone;
   int branch = kNone;
+  int inlet = kNone;
   bool diameters = false;
 };
 
-enum class Role { kX, kY, kZ, kRadius, kDiameter, kId, kParent, kBranch };
+enum class Role { kX, kY, kZ, kRadius, kDiameter, kId, kParent, kBranch, kInlet };
 
 struct ColumnName {
   std::string_view name;
@@ -67,7 +68,8 @@ constexpr std::array kColumnNames = {ColumnName{"x", Role::kX},
                                      ColumnName{"edge", Role::kBranch},
                                      ColumnName{"edgeid", Role::kBranch},
                                      ColumnName{"segment", Role::kBranch},
-                                     ColumnName{"vessel", Role::kBranch}};
+                                     ColumnName{"vessel", Role::kBranch},
+                                     ColumnName{"inlet", Role::kInlet}};
 
 // "Pos_X [mm]" -> "posx" and the unit "mm".
 std::string plain_column_name(std::string_view field, std::string& unit) {
@@ -92,6 +94,11 @@ tl::unexpected<Error> bad(std::string what, std::string where, std::string value
                           std::string rule) {
   return fail(
       {ErrorKind::kBadInput, std::move(what), std::move(where), std::move(value), std::move(rule)});
+}
+
+bool is_yes(std::string_view field) {
+  const std::string text = lower_case(field);
+  return text == "1" || text == "true" || text == "yes" || text == "inlet";
 }
 
 char separator_of(std::string_view line) {
@@ -196,6 +203,7 @@ class CsvReader {
     if (role == Role::kId) column = &columns_.id;
     if (role == Role::kParent) column = &columns_.parent;
     if (role == Role::kBranch) column = &columns_.branch;
+    if (role == Role::kInlet) column = &columns_.inlet;
     // A radius beats a diameter; any other column named twice cannot be told.
     if (role == Role::kDiameter && *column != kNone) return {};
     const bool replaces_diameter = role == Role::kRadius && columns_.diameters;
@@ -242,6 +250,9 @@ class CsvReader {
     const int key = columns_.parent != kNone   ? columns_.parent
                     : columns_.branch != kNone ? columns_.branch
                                                : fifth_;
+    if (columns_.inlet != kNone && is_yes(fields_[index(columns_.inlet)])) {
+      graph_.roots.push_back(static_cast<int>(rows_.size()));
+    }
     rows_.push_back({line, key == kNone ? std::string() : std::string(fields_[index(key)])});
     graph_.points.push_back(std::move(point));
     return {};
@@ -353,18 +364,44 @@ class CsvReader {
   }
 
   void link_lines() {
-    std::map<std::string_view, int> last;
+    struct Line {
+      int number;
+      int points;
+      int last;
+    };
+    std::map<std::string_view, Line> open;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const auto [found, is_new] = last.try_emplace(rows_[i].key, static_cast<int>(i));
-      if (!is_new) graph_.edges.emplace_back(found->second, static_cast<int>(i));
-      found->second = static_cast<int>(i);
+      const int row = static_cast<int>(i);
+      const int next = static_cast<int>(open.size());
+      const auto [found, is_new] = open.try_emplace(rows_[i].key, Line{next, 0, row});
+      Line& line = found->second;
+      if (is_new) graph_.line_names.push_back(rows_[i].key);
+      if (!is_new) {
+        graph_.edges.emplace_back(line.last, row);
+        graph_.line_of_edge.push_back(line.number);
+      }
+      line.last = row;
+      ++line.points;
+      if (columns_.branch != kNone && columns_.id == kNone) {
+        graph_.points[i].name = fmt::format("{}_{}", rows_[i].key, line.points);
+      }
     }
-    graph_.roots.push_back(0);
-    if (columns_.branch != kNone) {
-      facts_.notes.push_back(
-          fmt::format("{} lines, joined where they share a position", last.size()));
-    } else {
+    if (graph_.roots.empty()) graph_.roots.push_back(0);
+    if (columns_.branch == kNone) {
       facts_.notes.push_back("rows: one line, as there is neither a parent nor a branch column");
+      return;
+    }
+    facts_.notes.push_back(
+        fmt::format("{} lines, joined where they share a position", open.size()));
+    if (columns_.id != kNone) return;
+    for (const auto& [key, line] : open) {  // ends have names that stay when points are added
+      if (line.points > 1) graph_.points[index(line.last)].name = std::string(key) + "_end";
+    }
+    std::vector<bool> begun(open.size(), false);
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const Line& line = open.find(rows_[i].key)->second;
+      if (!begun[index(line.number)]) graph_.points[i].name = rows_[i].key + "_start";
+      begun[index(line.number)] = true;
     }
   }
 
@@ -392,12 +429,17 @@ Result<CenterlineTree> parse_csv_centerline(std::string_view text, std::string_v
 }
 
 std::string csv_text(const CenterlineTree& tree) {
-  std::string text = "branch,x_mm,y_mm,z_mm,radius_mm\n";
+  std::string text = "branch,x_mm,y_mm,z_mm,radius_mm,inlet\n";
+  std::vector<bool> is_inlet(tree.nodes.size(), false);
+  for (const int n : tree.inlets) is_inlet[index(n)] = true;
   for (const CenterlineBranch& branch : tree.branches) {
-    for (Eigen::Index i = 0; i < branch.points_mm.cols(); ++i) {
+    const Eigen::Index last = branch.points_mm.cols() - 1;
+    for (Eigen::Index i = 0; i <= last; ++i) {
       const Vec3 p = branch.points_mm.col(i);
-      fmt::format_to(std::back_inserter(text), "{},{},{},{},{}\n", branch.name, p.x(), p.y(), p.z(),
-                     branch.radii_mm(i));
+      const bool inlet =
+          (i == 0 && is_inlet[index(branch.from)]) || (i == last && is_inlet[index(branch.to)]);
+      fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{}\n", branch.name, p.x(), p.y(),
+                     p.z(), branch.radii_mm(i), inlet ? 1 : 0);
     }
   }
   return text;

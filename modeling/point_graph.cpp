@@ -14,6 +14,8 @@
 namespace angiospline {
 namespace {
 
+constexpr int kNamedJoins = 8;  // joined ends that are listed by name
+
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 // Union-find whose representative is the lowest member.
@@ -71,6 +73,7 @@ Key key_of(const Vec3& p) { return {p.x() + 0.0, p.y() + 0.0, p.z() + 0.0}; }  /
 struct Edge {
   int a, b;              // groups
   int point_a, point_b;  // members
+  int line;              // or -1
 };
 
 class TreeBuilder {
@@ -176,6 +179,8 @@ class TreeBuilder {
       if (groups_.of(g) == g && degree[p] > 0) places.emplace_back(key_of(position(g)), g);
     }
     std::sort(places.begin(), places.end());
+    int joined = 0;
+    std::string names;
     for (std::size_t i = 0; i < places.size();) {
       std::size_t last = i;
       bool has_end = false;
@@ -185,12 +190,18 @@ class TreeBuilder {
       }
       for (std::size_t j = i + 1; has_end && j < last; ++j) {
         if (groups_.join(places[i].second, places[j].second)) {
-          tree_.assumptions.push_back(fmt::format("points {} and {} share one position: joined",
-                                                  name(places[i].second), name(places[j].second)));
+          ++joined;
+          if (joined <= kNamedJoins) {
+            names += fmt::format("{}{} and {}", joined == 1 ? "" : ", ", name(places[i].second),
+                                 name(places[j].second));
+          }
         }
       }
       i = last;
     }
+    if (joined > kNamedJoins) names += fmt::format(" and {} more", joined - kNamedJoins);
+    if (joined > 0)
+      tree_.assumptions.push_back("ends at the position of another point joined to it: " + names);
   }
 
   // Edges between different groups; of the copies of a doubled edge the first stays.
@@ -213,7 +224,8 @@ class TreeBuilder {
     edges_.reserve(kept.size());
     for (const int e : kept) {
       const auto& [a, b] = graph_.edges[index(e)];
-      edges_.push_back({groups_.of(a), groups_.of(b), a, b});
+      const int line = graph_.line_of_edge.empty() ? -1 : graph_.line_of_edge[index(e)];
+      edges_.push_back({groups_.of(a), groups_.of(b), a, b, line});
     }
   }
 
@@ -259,9 +271,11 @@ class TreeBuilder {
     std::vector<int> members;  // the points whose radii the branch bears
     int here = start;
     int forward = 0;
+    int line = edges_[index(e)].line;
     while (true) {
       done[index(e)] = true;
       const Edge& edge = edges_[index(e)];
+      if (edge.line != line) line = -1;
       const bool along = edge.a == here;
       forward += along ? 1 : -1;
       if (members.empty()) members.push_back(along ? edge.point_a : edge.point_b);
@@ -283,6 +297,7 @@ class TreeBuilder {
     }
     second_.push_back(members.size() > 2 ? std::pair{members[1], members[members.size() - 2]}
                                          : std::pair{-1, -1});
+    line_.push_back(line);
     tree_.branches.push_back(std::move(branch));
   }
 
@@ -347,12 +362,20 @@ class TreeBuilder {
   void name_branches() {
     std::map<std::pair<int, int>, int> count;
     for (const CenterlineBranch& b : tree_.branches) ++count[std::minmax(b.from, b.to)];
+    std::vector<int> branches_of_line(graph_.line_names.size(), 0);
+    for (const int line : line_) {
+      if (line >= 0) ++branches_of_line[index(line)];
+    }
     std::map<std::string, int> taken;
     for (std::size_t b = 0; b < tree_.branches.size(); ++b) {
       CenterlineBranch& branch = tree_.branches[b];
       branch.name = tree_.nodes[index(branch.from)].name + "_" + tree_.nodes[index(branch.to)].name;
       if (count[std::minmax(branch.from, branch.to)] > 1 && second_[b].first >= 0) {
         branch.name += "_via_" + name(second_[b].first);
+      }
+      if (line_[b] >= 0 && branches_of_line[index(line_[b])] == 1 &&
+          !graph_.line_names[index(line_[b])].empty()) {
+        branch.name = graph_.line_names[index(line_[b])];
       }
       const int copies = taken[branch.name]++;
       if (copies > 0) branch.name += fmt::format("_copy_{}", copies);
@@ -371,6 +394,7 @@ class TreeBuilder {
   std::vector<std::pair<int, int>> pairs_;
   std::vector<int> node_of_;  // by group
   std::vector<int> group_of_node_;
+  std::vector<int> line_;                    // by branch: the only line it belongs to, or -1
   std::vector<std::pair<int, int>> second_;  // by branch: its points next to from and to, or -1
 };
 

@@ -20,6 +20,10 @@ struct PointGraph {
   std::vector<GraphPoint> points;
   std::vector<std::pair<int, int>> edges;  // in the direction of the flow where that is known
   std::vector<int> roots;                  // where flow enters, if the input says so
+
+  // The input's own names of lines: empty, or for each edge the index of its name in `line_names`.
+  std::vector<int> line_of_edge;
+  std::vector<std::string> line_names;
 };
 
 // The tree whose nodes are the ends and junctions of the graph and whose branches are the chains
@@ -33,9 +37,10 @@ struct PointGraph {
 //   and
 //      an assumption says so; a component without ends has none.
 // A node bears its point's name, a branch "<from>_<to>" ("<from>_<to>_via_<p>" with its first inner
-// point p where several join the same nodes). A ring without junctions is one branch from and to
-// its first point. Errors: no edge of positive length. Requires indices in range, finite positions,
-// positive radii. O(n log n) time, O(n) memory.
+// point p where several join the same nodes); a line's name is taken instead where the branch is
+// the only one of that line and has no edge of another. A ring without junctions is one branch from
+// and to its first point. Errors: no edge of positive length. Requires indices in range, finite
+// positions, positive radii. O(n log n) time, O(n) memory.
 Result<CenterlineTree> tree_from_points(const PointGraph& graph);
 
 }  // namespace angiospline
