@@ -90,7 +90,7 @@ TEST(Swc, ARepeatedPositionAtAnEndClosesALoop) {
   EXPECT_EQ(cycle_count(tree), 1);
   EXPECT_EQ(tree.nodes.size(), 4U);
   EXPECT_EQ(tree.branches.size(), 4U);
-  EXPECT_TRUE(says(tree, "share one position"));
+  EXPECT_TRUE(says(tree, "joined to it: 4 and 6"));
   EXPECT_NE(tree.branches[1].name, tree.branches[2].name);
 }
 
