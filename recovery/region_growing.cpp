@@ -320,6 +320,9 @@ bool Grower<T>::is_vessel(const Candidate& c) {
   report_.threshold_max = std::max(report_.threshold_max, in_image);
   threshold_sum_ += in_image;
   ++report_.examined;
+  if (options_.background_level &&
+      c.grey >= (c.grey + s1.mean() + sign_ * *options_.background_level) / 2)
+    return true;
   return mean_of_brightest_connected(c.at, box) >= threshold;
 }
 

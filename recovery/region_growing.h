@@ -24,6 +24,10 @@ struct GrowOptions {
   // Grey value that no vessel is darker than (brighter than, for dark vessels): voxels beyond it
   // are never looked at.
   std::optional<double> background;
+  // Typical grey value around the vessels. With it a voxel at least half way from it to mean(S1) is
+  // vessel whatever M says, so that a small M does not starve on smooth images, where the edge lies
+  // many deviations below the core. Not in the thesis; without it the rule is the thesis's alone.
+  std::optional<double> background_level;
   // Stops after looking at this many voxels.
   std::optional<std::size_t> max_examined;
   // A seed may lie this many voxels beside the vessel: it moves to the brightest voxel that near.

@@ -1,0 +1,20 @@
+// Gaussian smoothing of images, spacing honoured.
+#pragma once
+
+#include "base/progress.h"
+#include "recovery/any_image.h"
+
+namespace angiospline {
+
+// The image convolved with a Gaussian of standard deviation sigma_mm in every direction of the
+// world; the kernel is cut at three deviations and normalised, the border value goes on beyond the
+// border. Integers are rounded. Voxels that are not finite take no part and stay as they are. Along
+// an axis of extent 1 nothing happens; sigma 0 changes nothing.
+// Pass the image by std::move to smooth it in place: memory beyond it is then a few slices.
+// Requires sigma_mm >= 0. Time: linear in voxels times the kernel's length; parallel over rows, the
+// same result on any number of threads.
+template <typename T>
+Image<T> smoothed(Image<T> image, double sigma_mm);
+AnyImage smoothed(AnyImage image, double sigma_mm);
+
+}  // namespace angiospline
