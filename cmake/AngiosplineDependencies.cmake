@@ -5,6 +5,7 @@ find_package(fmt REQUIRED)
 find_package(TBB REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(nanoflann REQUIRED)
+find_package(ZLIB REQUIRED)
 # Debian keeps the C++ package of NLopt apart from the C one, under the same package name.
 find_package(NLopt REQUIRED CONFIG HINTS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/nlopt_cxx)
 find_package(TinyGLTF REQUIRED)

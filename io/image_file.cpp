@@ -113,6 +113,39 @@ Result<AnyImage> read_one(const fs::path& path, Format format, int dimensions) {
       .and_then([&] { return read_voxels(path, format); });
 }
 
+AnyImage scaled(AnyImage image, const MetaScaling& scaling) {
+  return std::visit(
+      [&](const auto& in) {
+        Image<float> out(in.grid);
+        std::transform(in.voxels.begin(), in.voxels.end(), out.voxels.begin(), [&](auto v) {
+          return static_cast<float>(scaling.slope * static_cast<double>(v) + scaling.offset);
+        });
+        return AnyImage(std::move(out));
+      },
+      image);
+}
+
+// One file, after the checks its format needs; `notes` gathers what was assumed.
+Result<AnyImage> read_checked(const fs::path& path, Format format, int dimensions,
+                              std::vector<std::string>& notes) {
+  if (format == Format::kNifti) {
+    const auto checked_notes = check_nifti(path);
+    if (!checked_notes) return fail(checked_notes.error());
+    notes.insert(notes.end(), checked_notes->begin(), checked_notes->end());
+    return read_one(path, format, dimensions).map([&](AnyImage image) {
+      restore_non_finite(image, path);
+      return image;
+    });
+  }
+  if (format != Format::kMeta) return read_one(path, format, dimensions);
+  const Result<MetaScaling> scaling = check_meta(path);
+  if (!scaling) return fail(scaling.error());
+  return read_one(path, format, dimensions).map([&](AnyImage image) {
+    const bool plain = scaling->slope == 1 && scaling->offset == 0;
+    return plain ? std::move(image) : scaled(std::move(image), *scaling);
+  });
+}
+
 template <typename T>
 std::size_t non_finite_count(const Image<T>& image) {
   if constexpr (std::is_floating_point_v<T>)
@@ -420,8 +453,8 @@ Result<ImageFile> read_image(const fs::path& path, const ReadImageOptions& optio
     });
   const Suffix* s = suffix_of(path);
   if (s == nullptr || !s->reads) return fail(unknown_suffix(path));
-  return read_one(path, s->format, 3).map([&](AnyImage image) {
-    std::vector<std::string> notes;
+  std::vector<std::string> notes;
+  return read_checked(path, s->format, 3, notes).map([&](AnyImage image) {
     if (s->format == Format::kTiff) set_stack_geometry(image, options, notes);
     return with_report(std::move(image), title(s->format), std::move(notes));
   });
@@ -431,8 +464,8 @@ Result<ImageFile> read_flat_image(const fs::path& path, const ReadImageOptions& 
   if (const auto present = check_present(path); !present) return fail(present.error());
   const Suffix* s = suffix_of(path);
   if (s == nullptr) return fail(unknown_suffix(path));
-  return read_one(path, s->format, 2).map([&](AnyImage image) {
-    std::vector<std::string> notes;
+  std::vector<std::string> notes;
+  return read_checked(path, s->format, 2, notes).map([&](AnyImage image) {
     if (s->format == Format::kTiff || s->format == Format::kPng)
       set_stack_geometry(image, options, notes);
     return with_report(std::move(image), title(s->format), std::move(notes));

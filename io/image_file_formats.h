@@ -26,6 +26,20 @@ Result<Description> describe(const std::filesystem::path& path, Format format);
 // The voxels of a file with one component a voxel and at most three axes longer than 1.
 Result<AnyImage> read_voxels(const std::filesystem::path& path, Format format);
 
+// What ITK passes over in silence. A NIfTI file: cut short, spacing 0 or not a number, negative
+// extents are errors; scaling that is not finite and missing orientation are notes.
+Result<std::vector<std::string>> check_nifti(const std::filesystem::path& path);
+
+// The NIfTI library turns voxels that are not finite into 0, which in many images is a bright
+// value: puts them back. Reads the voxels of float files once more, and nothing of others.
+void restore_non_finite(AnyImage& image, const std::filesystem::path& path);
+
+// A MetaImage: the same errors; its intensity scaling, which ITK leaves to the caller.
+struct MetaScaling {
+  double slope = 1, offset = 0;
+};
+Result<MetaScaling> check_meta(const std::filesystem::path& path);
+
 // Files of each DICOM series in a folder, in order of the series' names.
 struct DicomSeries {
   std::string uid;

@@ -1,11 +1,14 @@
 // The only file that knows ITK. It uses ITK's readers and writers one by one, without its image
 // type and its factories: nothing is registered globally and the voxels exist once.
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <map>
+#include <new>
 
 #include <fmt/format.h>
 #include <itkGDCMImageIO.h>
-#include <itkGDCMSeriesFileNames.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
@@ -56,14 +59,17 @@ itk::ImageIOBase::Pointer image_io(Format format) {
   return nullptr;
 }
 
-// ITK's descriptions run over several lines and name its source files; a user needs neither.
+// ITK's descriptions run over several lines and name its source files and addresses; a user needs
+// neither. NRRD's library tells the whole way it came: the last step says what is wrong.
 std::string one_line(const itk::ExceptionObject& e) {
   std::string text = e.GetDescription();
   for (char& c : text)
     if (c == '\n' || c == '\r' || c == '\t') c = ' ';
-  const auto colon = text.find("): ");
-  if (text.rfind("ITK ERROR", 0) == 0 && colon != std::string::npos) text.erase(0, colon + 3);
   while (!text.empty() && text.back() == ' ') text.pop_back();
+  for (const char* marker : {"ITK ERROR: ", "): ", "[nrrd] "}) {
+    const auto at = text.rfind(marker);
+    if (at != std::string::npos) text.erase(0, at + std::strlen(marker));
+  }
   return text;
 }
 
@@ -79,6 +85,8 @@ auto guarded(const std::filesystem::path& path, Format format, F&& body) -> decl
     return body();
   } catch (const itk::ExceptionObject& e) {
     return fail(unreadable(path, format, one_line(e)));
+  } catch (const std::bad_alloc&) {
+    return fail({ErrorKind::kFailed, "not enough memory for the image", path.string(), {}, {}});
   } catch (const std::exception& e) {
     return fail(unreadable(path, format, e.what()));
   }
@@ -204,13 +212,23 @@ Result<AnyImage> read_voxels(const std::filesystem::path& path, Format format) {
 
 Result<std::vector<DicomSeries>> dicom_series(const std::filesystem::path& folder) {
   return guarded(folder, Format::kDicom, [&]() -> Result<std::vector<DicomSeries>> {
-    itk::Object::SetGlobalWarningDisplay(false);
-    const auto names = itk::GDCMSeriesFileNames::New();
-    names->SetUseSeriesDetails(false);  // the plain SeriesInstanceUID is what users know
-    names->SetDirectory(folder.string());
+    std::map<std::string, std::vector<std::string>> files;
+    const auto io = itk::GDCMImageIO::New();
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      const std::string name = entry.path().string();
+      if (!entry.is_regular_file() || !io->CanReadFile(name.c_str())) continue;
+      io->SetFileName(name);
+      io->ReadImageInformation();
+      std::string uid;
+      io->GetValueFromTag("0020|000e", uid);
+      while (!uid.empty() && (uid.back() == ' ' || uid.back() == '\0')) uid.pop_back();
+      files[uid].push_back(name);
+    }
     std::vector<DicomSeries> result;
-    for (const std::string& uid : names->GetSeriesUIDs())
-      result.push_back({uid, names->GetFileNames(uid)});
+    for (auto& [uid, names] : files) {
+      std::sort(names.begin(), names.end());  // folders list in no order
+      result.push_back({uid, std::move(names)});
+    }
     return result;
   });
 }
