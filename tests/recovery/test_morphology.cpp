@@ -21,12 +21,10 @@ Mask random_mask(std::uint64_t seed, double share, Voxel size = {13, 9, 11}) {
   return m;
 }
 
-int reach(Connectivity c) {
-  return c == Neighbours::kFaces6 ? 1 : c == Neighbours::kEdges18 ? 2 : 3;
-}
+int reach(Neighbours c) { return c == Neighbours::kFaces6 ? 1 : c == Neighbours::kEdges18 ? 2 : 3; }
 
 // Labels by plain flood fill.
-Image<std::int32_t> flooded(const Mask& m, bool foreground, Connectivity c) {
+Image<std::int32_t> flooded(const Mask& m, bool foreground, Neighbours c) {
   Image<std::int32_t> labels(m.grid);
   int next = 0;
   for (std::size_t i = 0; i < m.voxels.size(); ++i) {
@@ -47,13 +45,12 @@ Image<std::int32_t> flooded(const Mask& m, bool foreground, Connectivity c) {
   return labels;
 }
 
-constexpr Connectivity kAll[] = {Neighbours::kFaces6, Neighbours::kEdges18,
-                                 Neighbours::kCorners26};
+constexpr Neighbours kAll[] = {Neighbours::kFaces6, Neighbours::kEdges18, Neighbours::kCorners26};
 
 TEST(Morphology, ComponentsAreThoseOfAFloodFill) {
   std::size_t seen = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed)
-    for (const Connectivity c : kAll) {
+    for (const Neighbours c : kAll) {
       const Mask m = random_mask(seed, 0.05 + 0.02 * static_cast<double>(seed % 20));
       const Components found = connected_components(m, c);
       EXPECT_EQ(found.labels.voxels, flooded(m, true, c).voxels) << seed;
@@ -124,7 +121,7 @@ TEST(Morphology, DilationOfOneVoxelIsItsNeighbourhood) {
 
 TEST(Morphology, ErosionIsDilationOfTheComplement) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
-    for (const Connectivity c : kAll) {
+    for (const Neighbours c : kAll) {
       const Mask m = random_mask(seed, 0.8);
       Mask complement = m;
       for (auto& v : complement.voxels) v = v == 0;
@@ -137,7 +134,7 @@ TEST(Morphology, ErosionIsDilationOfTheComplement) {
 TEST(Morphology, ClosingContainsTheMaskAndIsIdempotent) {
   std::size_t added = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed)
-    for (const Connectivity c : kAll) {
+    for (const Neighbours c : kAll) {
       const Mask m = random_mask(seed, 0.3);
       const Mask once = close(m, 1, c);
       for (std::size_t i = 0; i < m.voxels.size(); ++i) {
