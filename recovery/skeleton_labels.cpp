@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "recovery/thinning.h"
+#include "recovery/topology_numbers.h"
 
 namespace angiospline {
 namespace {
@@ -43,24 +44,26 @@ int weight(const SkeletonLabels& s, int i) {
   return sum;
 }
 
-// Tunnels of a connected set of voxels: 1 - Euler characteristic of their closed cubes. The set is
-// a cluster of an axis, so it encloses no cavity unless it is a closed sheet; then the answer is at
-// least 0.
-int cycles_of(const SkeletonLabels& s, const std::vector<int>& members) {
-  if (members.size() < 4) return 0;       // fewer voxels cannot close a ring
-  std::vector<std::array<int, 3>> cells;  // coordinates doubled: the parity of each says its extent
-  cells.reserve(27 * members.size());
+// Tunnels and cavities of the members alone.
+TopologyNumbers topology_of(const SkeletonLabels& s, const std::vector<int>& members) {
+  if (members.size() < 4) return {1, 0, 0, 1};  // fewer voxels close neither ring nor shell
+  Voxel low = s.voxel(members[0]);
+  Voxel high = low;
   for (const int i : members) {
     const Voxel v = s.voxel(i);
-    for (int z = 0; z <= 2; ++z)
-      for (int y = 0; y <= 2; ++y)
-        for (int x = 0; x <= 2; ++x) cells.push_back({2 * v[0] + x, 2 * v[1] + y, 2 * v[2] + z});
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], v[a]);
+      high[a] = std::max(high[a], v[a]);
+    }
   }
-  std::sort(cells.begin(), cells.end());
-  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
-  int euler = 0;
-  for (const auto& c : cells) euler += ((c[0] & 1) + (c[1] & 1) + (c[2] & 1)) % 2 == 0 ? 1 : -1;
-  return std::max(0, 1 - euler);
+  Mask box;
+  for (std::size_t a = 0; a < 3; ++a) box.grid.size[a] = high[a] - low[a] + 1;
+  box.voxels.assign(box.grid.voxel_count(), 0);
+  for (const int i : members) {
+    const Voxel v = s.voxel(i);
+    box[{v[0] - low[0], v[1] - low[1], v[2] - low[2]}] = 1;
+  }
+  return topology_numbers(box, s.connectivity);
 }
 
 // `counted` holds for each voxel the last cluster of which it was found to be an exit.
@@ -79,7 +82,9 @@ JunctionCluster grow_cluster(SkeletonLabels& s, int seed, int number, std::vecto
       }
     }
   for (const int i : c.members) c.weights.push_back(weight(s, i));
-  c.cycles = cycles_of(s, c.members);
+  const TopologyNumbers t = topology_of(s, c.members);
+  c.cycles = static_cast<int>(t.cycles);
+  c.cavities = static_cast<int>(t.cavities);
   return c;
 }
 

@@ -26,7 +26,8 @@ struct JunctionCluster {
   std::vector<int> members;  // in the order of the search that found them
   std::vector<int> weights;  // of each member: face 5, edge 3, vertex 1, over all its neighbours
   std::vector<int> exits;    // neighbours with one or two neighbours: 3 in a bifurcation
-  int cycles = 0;            // tunnels among the members themselves, which a graph cannot show
+  int cycles = 0;            // tunnels among the members themselves, which a graph cannot show,
+  int cavities = 0;          // and cavities: an axis of a hollow body is a closed sheet
 };
 
 // An axis as its voxels, their neighbours and their labels. Memory follows the axis, not the image.

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <deque>
 #include <limits>
+#include <numbers>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -221,7 +222,8 @@ Result<Mask> thin_with(Mask mask, const ThinningOptions& options, const Progress
   Thinner<Offset> thinner(mask, options.connectivity, true);
   if (options.order == ThinningOrder::kDistance) {
     distances_mm = distances_to_background_mm(mask);
-    thinner.order_by_distance(distances_mm, mask.grid.spacing_mm.minCoeff());
+    // Fine enough that no voxel's layer comes after the one in which its turn would come by faces.
+    thinner.order_by_distance(distances_mm, mask.grid.spacing_mm.minCoeff() / std::numbers::sqrt3);
   }
   thinner.find_boundary();
   if (!thinner.run(progress)) return fail(cancelled("thin"));

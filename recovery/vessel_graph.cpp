@@ -43,6 +43,7 @@ class Tracer {
     if (label == PointLabel::kJunction) {
       const JunctionCluster& c = s_.clusters[index(s_.cluster[index(i)])];
       node.cluster_cycles = c.cycles;
+      node.cluster_cavities = c.cavities;
       for (const int m : c.members) {
         node.cluster.push_back(s_.voxel(m));
         node_of_[index(m)] = number;

@@ -1,0 +1,105 @@
+#include "recovery/lumen_section.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+
+namespace angiospline {
+namespace {
+
+bool is_foreground(const Mask& mask, int x, int y, int z) {
+  const Voxel v{x, y, z};
+  return mask.grid.contains(v) && mask[v] != 0;
+}
+
+// The mask between voxel centres, trilinear.
+double occupancy(const Mask& mask, const Vec3& p) {
+  const int x = static_cast<int>(std::floor(p[0]));
+  const int y = static_cast<int>(std::floor(p[1]));
+  const int z = static_cast<int>(std::floor(p[2]));
+  const double a = p[0] - x;
+  const double b = p[1] - y;
+  const double c = p[2] - z;
+  double sum = 0.0;
+  for (int k = 0; k < 8; ++k) {
+    const int i = k & 1;
+    const int j = k >> 1 & 1;
+    const int l = k >> 2;
+    if (is_foreground(mask, x + i, y + j, z + l))
+      sum += (i ? a : 1.0 - a) * (j ? b : 1.0 - b) * (l ? c : 1.0 - c);
+  }
+  return sum;
+}
+
+// Walks by half voxels over the nearest voxels, which is cheap, and looks closely only at the wall.
+double distance_to_wall_vox(const Mask& mask, const Vec3& from, const Vec3& step_per_mm,
+                            double pace_mm, double longest_mm) {
+  const auto inside = [&](double t) {
+    const Vec3 p = from + t * step_per_mm;
+    return is_foreground(mask, static_cast<int>(std::lround(p[0])),
+                         static_cast<int>(std::lround(p[1])), static_cast<int>(std::lround(p[2])));
+  };
+  double t = pace_mm;
+  while (t < longest_mm && inside(t)) t += pace_mm;
+  // The interpolated wall lies within a voxel of the first background voxel met.
+  double before = std::max(0.0, t - 3.0 * pace_mm);
+  double f_before = occupancy(mask, from + before * step_per_mm);
+  while (before > 0.0 && f_before < 0.5) {
+    before = std::max(0.0, before - pace_mm);
+    f_before = occupancy(mask, from + before * step_per_mm);
+  }
+  if (f_before < 0.5) return 0.0;
+  const double fine = 0.5 * pace_mm;
+  for (;;) {
+    const double after = before + fine;
+    const double f_after = occupancy(mask, from + after * step_per_mm);
+    if (f_after < 0.5) return before + fine * (f_before - 0.5) / (f_before - f_after);
+    if (after >= longest_mm) return longest_mm;
+    before = after;
+    f_before = f_after;
+  }
+}
+
+}  // namespace
+
+PlaneBasis plane_basis(const Vec3& w) {
+  Eigen::Index least = 0;
+  w.cwiseAbs().minCoeff(&least);
+  const Vec3 u = w.cross(Vec3::Unit(least)).normalized();
+  return {u, w.cross(u)};
+}
+
+double distance_to_wall_mm(const Mask& mask, const Vec3& point_mm, const Vec3& direction,
+                           double longest_mm) {
+  const ImageGrid& g = mask.grid;
+  const Vec3 step_per_mm = (g.direction.transpose() * direction).cwiseQuotient(g.spacing_mm);
+  const double pace_mm = 0.5 / step_per_mm.norm();  // half a voxel in this direction
+  return std::min(longest_mm, distance_to_wall_vox(mask, g.index_vox(point_mm), step_per_mm,
+                                                   pace_mm, longest_mm));
+}
+
+LumenSection lumen_section(const Mask& mask, const Vec3& point_mm, const Vec3& normal,
+                           double longest_mm) {
+  LumenSection section{point_mm, 0.0, false};
+  if (occupancy(mask, mask.grid.index_vox(point_mm)) < 0.5) return section;
+  const PlaneBasis basis = plane_basis(normal);
+  Vec3 moment = Vec3::Zero();
+  double squares = 0.0;
+  section.closed = true;
+  for (int k = 0; k < kSectionRays; ++k) {
+    const double angle = 2.0 * std::numbers::pi * k / kSectionRays;
+    const Vec3 direction = std::cos(angle) * basis.u + std::sin(angle) * basis.v;
+    const double d = distance_to_wall_mm(mask, point_mm, direction, longest_mm);
+    section.closed = section.closed && d < longest_mm;
+    moment += d * direction;
+    squares += d * d;
+  }
+  // A circle seen from a point off its centre by e: d = radius + e . direction to first order, and
+  // half the mean of d^2 over the angle is its area over 2 pi wherever the point lies.
+  section.center_mm = point_mm + 2.0 / kSectionRays * moment;
+  section.radius_mm = std::sqrt(squares / kSectionRays);
+  return section;
+}
+
+}  // namespace angiospline

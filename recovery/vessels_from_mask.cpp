@@ -1,0 +1,56 @@
+#include "recovery/vessels_from_mask.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace angiospline {
+namespace {
+
+int nearest_node(const VesselGraph& graph, const Vec3& point_mm) {
+  const auto nearest = std::min_element(
+      graph.nodes.begin(), graph.nodes.end(), [&](const VesselNode& a, const VesselNode& b) {
+        return (graph.grid.world_mm(a.voxel) - point_mm).squaredNorm() <
+               (graph.grid.world_mm(b.voxel) - point_mm).squaredNorm();
+      });
+  return static_cast<int>(nearest - graph.nodes.begin());
+}
+
+}  // namespace
+
+Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& options,
+                                  const Progress& progress) {
+  Vessels vessels;
+  const Connectivity connectivity = options.thinning.connectivity;
+  vessels.before = topology_numbers(mask, connectivity);
+  if (vessels.before.components == 0)
+    return fail(
+        {ErrorKind::kBadInput, "mask is empty", {}, {}, "at least one voxel must be foreground"});
+  Result<Mask> axis = thin(mask, options.thinning, progress);
+  if (!axis) return fail(axis.error());
+  PruningOptions pruning = options.pruning;
+  pruning.connectivity = connectivity;
+  Result<PrunedSkeleton> pruned = prune_twigs(mask, std::move(*axis), pruning, progress);
+  if (!pruned) return fail(pruned.error());
+  vessels.skeleton = std::move(pruned->skeleton);
+  vessels.twigs = pruned->twigs;
+  vessels.after = topology_numbers(vessels.skeleton, connectivity);
+  std::vector<int> roots;
+  for (const Vec3& root : options.roots_mm) roots.push_back(nearest_node(pruned->graph, root));
+  const std::size_t given = roots.size();
+  for (const int n : thickest_ends(pruned->graph, mask)) roots.push_back(n);
+  vessels.graph =
+      rooted_at(pruned->graph, roots);  // the first root in a component rules: the given one
+  Result<CenterlineTree> tree =
+      centerlines_from_graph(vessels.graph, mask, options.centerlines, progress);
+  if (!tree) return fail(tree.error());
+  vessels.tree = std::move(*tree);
+  for (const int inlet : vessels.tree.inlets)
+    vessels.tree.assumptions.push_back(
+        fmt::format("inlet {}: {}", vessels.tree.nodes[static_cast<std::size_t>(inlet)].name,
+                    given > 0 ? "nearest to a given root, or else the thickest end"
+                              : "the thickest end, since no root was given"));
+  return vessels;
+}
+
+}  // namespace angiospline

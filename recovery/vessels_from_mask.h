@@ -1,0 +1,40 @@
+// From a mask to centerlines in one call: thinning, labels, graph, pruning, radii, smoothing.
+#pragma once
+
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "modeling/centerline_tree.h"
+#include "recovery/centerlines_from_graph.h"
+#include "recovery/pruning.h"
+#include "recovery/thinning.h"
+#include "recovery/topology_numbers.h"
+#include "recovery/vessel_graph.h"
+
+namespace angiospline {
+
+struct VesselsOptions {
+  ThinningOptions thinning{Connectivity::k26, ThinningOrder::kDistance};  // fewest twigs
+  PruningOptions pruning;  // its connectivity is that of the thinning
+  CenterlineOptions centerlines;
+  // Where flow enters: the node nearest to each is the root and, if it is an end, the inlet of its
+  // component. A component without one takes its thickest end.
+  std::vector<Vec3> roots_mm;
+};
+
+struct Vessels {
+  Mask skeleton;           // pruned, one voxel thick
+  VesselGraph graph;       // rooted at the inlets
+  CenterlineTree tree;     // nodes and branches in the graph's order, without lonely voxels
+  int twigs = 0;           // branches pruned
+  TopologyNumbers before;  // of the mask
+  TopologyNumbers after;   // of the skeleton: components, cavities and cycles are the same
+};
+
+// Everything between a mask and its centerline tree. The mask is used as it is: fill its cavities
+// and holes first. Errors: an empty mask; no branch; stopped on request.
+Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& options = {},
+                                  const Progress& progress = {});
+
+}  // namespace angiospline
