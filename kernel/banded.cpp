@@ -69,6 +69,31 @@ void BandedCholesky::solve(Eigen::Ref<Eigen::MatrixXd> x) const {
   }
 }
 
+void BandedCholesky::solve_blocks(double* x, int stride) const {
+  const auto block = [&](int i) { return x + static_cast<std::ptrdiff_t>(i) * stride; };
+  const auto row_of = [&](int i) { return band_.data() + static_cast<std::ptrdiff_t>(i) * width_; };
+  for (int i = 0; i < size_; ++i) {
+    double* y = block(i);
+    for (int k = std::max(0, i - width_ + 1); k < i; ++k) {
+      const double factor = row_of(i)[i - k];
+      const double* other = block(k);
+      for (int c = 0; c < stride; ++c) y[c] -= factor * other[c];
+    }
+    const double pivot = row_of(i)[0];
+    for (int c = 0; c < stride; ++c) y[c] /= pivot;
+  }
+  for (int i = size_ - 1; i >= 0; --i) {
+    double* y = block(i);
+    const double pivot = row_of(i)[0];
+    for (int c = 0; c < stride; ++c) y[c] /= pivot;
+    for (int k = std::max(0, i - width_ + 1); k < i; ++k) {
+      const double factor = row_of(i)[i - k];
+      double* other = block(k);
+      for (int c = 0; c < stride; ++c) other[c] -= factor * y[c];
+    }
+  }
+}
+
 int solve_totally_positive(const CompactRows& A, Eigen::Ref<Eigen::MatrixXd> b) {
   EXPECTS(A.rows() == A.columns() && b.rows() == A.rows());
   const int n = A.rows();

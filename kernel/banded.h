@@ -28,6 +28,9 @@ class BandedCholesky {
   // Overwrites the columns of `x` (right-hand sides) by the solution. Requires factor() == -1.
   void solve(Eigen::Ref<Eigen::MatrixXd> x) const;
 
+  // The same for right-hand sides held as size() consecutive blocks of `stride` doubles.
+  void solve_blocks(double* x, int stride) const;
+
  private:
   int size_;
   int width_;

@@ -15,27 +15,63 @@ CompactRows::CompactRows(int rows, int columns, int width)
 }
 
 void CompactRows::set_row(int row, int column, const double* entries, int count) {
+  double* target = values_.data() + static_cast<std::ptrdiff_t>(row) * width_;
+  if (count == width_ && column >= 0 && column + count <= columns_) {
+    first_[static_cast<std::size_t>(row)] = column;
+    std::copy_n(entries, count, target);
+    return;
+  }
   const int from = std::max(column, 0);
   const int to = std::min(column + count, columns_);
   EXPECTS(to - from <= width_);
   const int start = std::clamp(from, 0, columns_ - width_);
-  double* target = values_.data() + static_cast<std::ptrdiff_t>(row) * width_;
   first_[static_cast<std::size_t>(row)] = start;
   std::fill_n(target, width_, 0.0);
   for (int c = from; c < to; ++c) target[c - start] = entries[c - column];
 }
 
-void CompactRows::apply_blocks(const double* blocks, std::ptrdiff_t stride, double* out) const {
-  for (int r = 0; r < rows(); ++r) {
-    const double* a = row(r);
-    const double* in = blocks + first(r) * stride;
-    double* sum = out + r * stride;
-    std::fill_n(sum, stride, 0.0);
-    for (int j = 0; j < width_; ++j, in += stride) {
-      const double factor = a[j];
-      if (factor == 0) continue;
-      for (std::ptrdiff_t k = 0; k < stride; ++k) sum[k] += factor * in[k];
+namespace {
+
+// kStride > 0 is a block size known at compile time.
+template <int kStride>
+void apply_rows(const CompactRows& A, const double* blocks, std::ptrdiff_t runtime, double* out) {
+  const std::ptrdiff_t stride = kStride > 0 ? kStride : runtime;
+  const int width = A.width();
+  for (int r = 0; r < A.rows(); ++r) {
+    const double* a = A.row(r);
+    const double* in = blocks + A.first(r) * stride;
+    double* result = out + r * stride;
+    if constexpr (kStride > 0) {
+      double sum[kStride] = {};
+      for (int j = 0; j < width; ++j, in += stride) {
+        for (int k = 0; k < kStride; ++k) sum[k] += a[j] * in[k];
+      }
+      for (int k = 0; k < kStride; ++k) result[k] = sum[k];
+    } else {
+      std::fill_n(result, stride, 0.0);
+      for (int j = 0; j < width; ++j, in += stride) {
+        const double factor = a[j];
+        if (factor == 0) continue;
+        for (std::ptrdiff_t k = 0; k < stride; ++k) result[k] += factor * in[k];
+      }
     }
+  }
+}
+
+}  // namespace
+
+void CompactRows::apply_blocks(const double* blocks, std::ptrdiff_t stride, double* out) const {
+  switch (stride) {
+    case 1:
+      return apply_rows<1>(*this, blocks, stride, out);
+    case 2:
+      return apply_rows<2>(*this, blocks, stride, out);
+    case 3:
+      return apply_rows<3>(*this, blocks, stride, out);
+    case 4:
+      return apply_rows<4>(*this, blocks, stride, out);
+    default:
+      return apply_rows<0>(*this, blocks, stride, out);
   }
 }
 
@@ -44,12 +80,7 @@ Eigen::Matrix<double, D, Eigen::Dynamic> CompactRows::apply(
     const Eigen::Matrix<double, D, Eigen::Dynamic>& points) const {
   EXPECTS(points.cols() == columns_);
   Eigen::Matrix<double, D, Eigen::Dynamic> result(D, rows());
-  for (int r = 0; r < rows(); ++r) {
-    const double* a = row(r);
-    Eigen::Matrix<double, D, 1> sum = a[0] * points.col(first(r));
-    for (int j = 1; j < width_; ++j) sum += a[j] * points.col(first(r) + j);
-    result.col(r) = sum;
-  }
+  apply_blocks(points.data(), D, result.data());
   return result;
 }
 

@@ -1,0 +1,227 @@
+#include "kernel/reduce.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/contract.h"
+#include "kernel/reduce_engine.h"
+#include "kernel/refinement.h"
+#include "kernel/reshape.h"
+
+namespace angiospline {
+
+// Without knot z = U(j), the last of its equals, the p + 2 control points d(j-p-1) .. d(j) must
+// come from p + 1 by Boehm's insertion; the one condition v'd = 0 says whether they do, and |v'd| /
+// |v|_1 is how far, in the largest coefficient, they are from it.
+std::vector<double> knot_weights(const KnotVector& knots, const double* points, int stride,
+                                 int group) {
+  const int p = knots.degree();
+  const int total = static_cast<int>(knots.knots().size());
+  std::vector<double> weights;
+  std::vector<double> value(static_cast<std::size_t>(stride));
+  for (int j = 0; j < total; ++j) {
+    const double z = knots[j];
+    if (!(z > knots.first() && z < knots.last())) continue;
+    int last = j;
+    while (knots[last + 1] == z) ++last;
+    // Copies before the last of a multiple knot guard a lower derivative: its jump is what counts
+    // once they alone are left, so they are taken as weighty as the last one.
+    const int mu = last - 1;
+    std::fill(value.begin(), value.end(), 0.0);
+    double v = 1;
+    double norm = 0;
+    double alpha = 1;  // of row k; 1 before the first, 0 behind the last
+    for (int k = mu - p; k <= mu + 1; ++k) {
+      if (k > mu - p) {
+        const double next = k <= mu ? (z - knots[k]) / (knots[k + p + 1] - knots[k]) : 0.0;
+        v *= -alpha / (1 - next);
+        alpha = next;
+      }
+      norm += std::abs(v);
+      const double* block = points + static_cast<std::ptrdiff_t>(k) * stride;
+      for (int c = 0; c < stride; ++c) value[static_cast<std::size_t>(c)] += v * block[c];
+    }
+    double largest = 0;
+    for (int c = 0; c < stride; c += group) {
+      double sum = 0;
+      for (int g = 0; g < group; ++g) {
+        const double x = value[static_cast<std::size_t>(c + g)];
+        sum += x * x;
+      }
+      largest = std::max(largest, sum);
+    }
+    weights.push_back(std::sqrt(largest) / norm);
+  }
+  return weights;
+}
+
+template <int D>
+Result<ReducedCurve<D>> reduce(const BSplineCurve<D>& curve, const ReductionOptions& options) {
+  if (auto error = reduction_option_error(curve.knots(), options.tolerance, options.held_first,
+                                          options.held_last)) {
+    return fail(*error);
+  }
+  const ReductionProblem problem{curve.knots(),
+                                 curve.control_points().data(),
+                                 D,
+                                 D,
+                                 options.tolerance,
+                                 options.held_first,
+                                 options.held_last,
+                                 options.kept,
+                                 options.polish};
+  DirectionResult result = reduce_direction(problem);
+  const int count = result.knots.control_point_count();
+  typename BSplineCurve<D>::ControlPoints points =
+      Eigen::Map<const typename BSplineCurve<D>::ControlPoints>(result.points.data(), D, count);
+  return ReducedCurve<D>{BSplineCurve<D>(std::move(result.knots), std::move(points)),
+                         result.error_bound, result.trials};
+}
+
+namespace {
+
+std::vector<double> interior_knots(const KnotVector& knots) {
+  std::vector<double> interior;
+  for (const double t : knots.knots()) {
+    if (t > knots.first() && t < knots.last()) interior.push_back(t);
+  }
+  return interior;
+}
+
+// One direction of a net: blocks of the other direction's control points. Where there are many of
+// those, knots are sought on a few lines across the net, a little inside the tolerance, and then
+// have to do for all.
+template <int D>
+DirectionResult reduce_u(const BSplineSurface<D>& surface, double tolerance,
+                         const SurfaceReductionOptions& options) {
+  constexpr int kLines = 12;
+  const int lines = surface.v_count();
+  ReductionProblem problem{surface.u(),     surface.control_points().data(),
+                           D * lines,       D,
+                           tolerance,       options.held_u0,
+                           options.held_u1, options.kept_u,
+                           options.polish};
+  const int step = lines / kLines;
+  if (step < 2) return reduce_direction(problem);
+  const int kept = (lines - 1) / step + 1;
+  Eigen::Matrix<double, D, Eigen::Dynamic> few(D,
+                                               static_cast<Eigen::Index>(surface.u_count()) * kept);
+  for (int i = 0; i < surface.u_count(); ++i) {
+    for (int j = 0; j < kept; ++j) {
+      few.col(static_cast<Eigen::Index>(i) * kept + j) = surface.control_point(i, j * step);
+    }
+  }
+  int trials = 0;
+  for (const double caution : {0.97, 0.85, 0.6}) {
+    ReductionProblem sketch = problem;
+    sketch.points = few.data();
+    sketch.stride = D * kept;
+    sketch.tolerance = caution * tolerance;
+    const DirectionResult found = reduce_direction(sketch);
+    trials += found.trials;
+    if (auto result = fit_direction(problem, interior_knots(found.knots))) {
+      result->trials += trials;
+      return std::move(*result);
+    }
+  }
+  DirectionResult result = reduce_direction(problem);
+  result.trials += trials;
+  return result;
+}
+
+template <int D>
+BSplineSurface<D> with_u(const BSplineSurface<D>& surface, DirectionResult result) {
+  typename BSplineSurface<D>::ControlPoints net =
+      Eigen::Map<const typename BSplineSurface<D>::ControlPoints>(
+          result.points.data(), D, static_cast<Eigen::Index>(result.points.size()) / D);
+  return BSplineSurface<D>(std::move(result.knots), surface.v(), std::move(net));
+}
+
+SurfaceReductionOptions swapped(const SurfaceReductionOptions& o) {
+  return {o.tolerance, o.held_v0, o.held_v1, o.held_u0, o.held_u1, o.kept_v, o.kept_u, o.polish};
+}
+
+// The bound on a difference of surfaces: along v the net is in the original's or the union's
+// control points, so the hull argument holds in both directions.
+template <int D>
+double surface_difference(const BSplineSurface<D>& a, const BSplineSurface<D>& b, double enough) {
+  const KnotVector v = merged_knots(a.v(), b.v());
+  const BSplineSurface<D> fine_a = refine(a, a.u(), v);
+  const BSplineSurface<D> fine_b = refine(b, b.u(), v);
+  return difference_bound(a.u(), fine_a.control_points().data(), b.u(),
+                          fine_b.control_points().data(), D * v.control_point_count(), D, enough);
+}
+
+// u, then v with what is left of the tolerance. The two errors add up at worst; as they seldom do,
+// v may try again with the tolerance that the true sum would allow.
+template <int D>
+ReducedSurface<D> reduce_u_first(const BSplineSurface<D>& surface, double share,
+                                 const SurfaceReductionOptions& options) {
+  DirectionResult along_u = reduce_u(surface, share * options.tolerance, options);
+  int trials = along_u.trials;
+  const double left = options.tolerance - along_u.error_bound;
+  const BSplineSurface<D> half = swap_uv(with_u(surface, std::move(along_u)));
+  const SurfaceReductionOptions options_v = swapped(options);
+  ReducedSurface<D> best{surface, 0.0, 0, ReductionOrder::kUFirst};
+  double tolerance = left;
+  for (int pass = 0; pass < 2; ++pass) {
+    DirectionResult along_v = reduce_u(half, tolerance, options_v);
+    trials += along_v.trials;
+    BSplineSurface<D> candidate = swap_uv(with_u(half, std::move(along_v)));
+    const bool fewer = pass == 0 || candidate.v_count() < best.surface.v_count();
+    if (!fewer) break;
+    const double bound = surface_difference(surface, candidate, options.tolerance);
+    if (pass > 0 && !(bound <= options.tolerance)) break;
+    best.surface = std::move(candidate);
+    best.error_bound = std::min(bound, options.tolerance);
+    if (bound > 0.95 * options.tolerance || !(bound > 0)) break;
+    tolerance = std::min(options.tolerance, tolerance * options.tolerance / bound);
+  }
+  best.trials = trials;
+  return best;
+}
+
+}  // namespace
+
+template <int D>
+Result<ReducedSurface<D>> reduce(const BSplineSurface<D>& surface,
+                                 const SurfaceReductionOptions& options) {
+  for (const bool along_u : {true, false}) {
+    auto error = reduction_option_error(along_u ? surface.u() : surface.v(), options.tolerance,
+                                        along_u ? options.held_u0 : options.held_v0,
+                                        along_u ? options.held_u1 : options.held_v1);
+    if (!error) continue;
+    error->where += along_u ? ", u direction" : ", v direction";
+    return fail(*error);
+  }
+  constexpr double kShare = 0.6;  // of the tolerance for the direction that goes first
+  ReducedSurface<D> u_first = reduce_u_first(surface, kShare, options);
+  ReducedSurface<D> v_first = reduce_u_first(swap_uv(surface), kShare, swapped(options));
+  const int trials = u_first.trials + v_first.trials;
+  const auto size = [](const ReducedSurface<D>& s) { return s.surface.control_points().cols(); };
+  if (size(v_first) < size(u_first)) {
+    return ReducedSurface<D>{swap_uv(v_first.surface), v_first.error_bound, trials,
+                             ReductionOrder::kVFirst};
+  }
+  u_first.trials = trials;
+  return u_first;
+}
+
+#define ANGIOSPLINE_INSTANTIATE(D)                                    \
+  template Result<ReducedSurface<D>> reduce(const BSplineSurface<D>&, \
+                                            const SurfaceReductionOptions&);
+ANGIOSPLINE_INSTANTIATE(2)
+ANGIOSPLINE_INSTANTIATE(3)
+ANGIOSPLINE_INSTANTIATE(4)
+#undef ANGIOSPLINE_INSTANTIATE
+
+#define ANGIOSPLINE_INSTANTIATE(D) \
+  template Result<ReducedCurve<D>> reduce(const BSplineCurve<D>&, const ReductionOptions&);
+ANGIOSPLINE_INSTANTIATE(1)
+ANGIOSPLINE_INSTANTIATE(2)
+ANGIOSPLINE_INSTANTIATE(3)
+ANGIOSPLINE_INSTANTIATE(4)
+#undef ANGIOSPLINE_INSTANTIATE
+
+}  // namespace angiospline

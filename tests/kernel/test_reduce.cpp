@@ -1,0 +1,221 @@
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "kernel/fit.h"
+#include "kernel/grid.h"
+#include "kernel/reduce.h"
+#include "kernel/refinement.h"
+#include "tests/kernel/random_splines.h"
+
+namespace angiospline {
+namespace {
+
+KnotVector uniform_knots(int degree, int count) {
+  return KnotVector::clamped(degree, spaced(0, 1, count - degree + 1));
+}
+
+// Radius 10, pitch 5, five turns, 1000 control points.
+BSplineCurve<3> helix(double noise) {
+  const KnotVector knots = uniform_knots(5, 1000);
+  const std::vector<double> nodes = knots.greville();
+  Eigen::Matrix3Xd points(3, knots.control_point_count());
+  for (int i = 0; i < points.cols(); ++i) {
+    const double angle = 10 * std::numbers::pi * nodes[static_cast<std::size_t>(i)];
+    points.col(i) << 10 * std::cos(angle), 10 * std::sin(angle),
+        25 * nodes[static_cast<std::size_t>(i)];
+  }
+  Eigen::Matrix3Xd net = interpolate_at_greville<3>(knots, points).control_points();
+  Random random(7);
+  for (Eigen::Index i = 0; i < net.size(); ++i) net.data()[i] += noise * random.gaussian();
+  return BSplineCurve<3>(knots, net);
+}
+
+double largest_distance(const BSplineCurve<3>& a, const BSplineCurve<3>& b, int samples = 20001) {
+  const auto t = spaced(a.knots().first(), a.knots().last(), samples);
+  return (evaluate(a, t) - evaluate(b, t)).colwise().norm().maxCoeff();
+}
+
+TEST(Reduce, HelixNeedsNoMoreControlPointsThanTheBestKnownFigures) {
+  // Best uniform least squares needs 34 at 1e-3; the others are regressions of this code.
+  const BSplineCurve<3> clean = helix(0);
+  const std::pair<double, int> wanted[] = {
+      {1e-2, 27}, {1e-3, 34}, {1e-4, 47}, {1e-5, 65}, {1e-6, 92}};
+  for (const auto& [tolerance, count] : wanted) {
+    ReductionOptions options;
+    options.tolerance = tolerance;
+    const auto reduced = reduce(clean, options);
+    ASSERT_TRUE(reduced) << reduced.error().message();
+    EXPECT_LE(reduced->curve.knots().control_point_count(), count) << "tolerance " << tolerance;
+    const double error = largest_distance(clean, reduced->curve);
+    EXPECT_LE(error, tolerance);
+    EXPECT_LE(error, reduced->error_bound);
+    EXPECT_LE(reduced->error_bound, tolerance);
+    EXPECT_GT(error, 0.5 * tolerance);  // the tolerance is used
+    EXPECT_LT((reduced->curve.at(0) - clean.at(0)).norm(), 1e-12);
+    EXPECT_LT((reduced->curve.at(1) - clean.at(1)).norm(), 1e-12);
+  }
+}
+
+TEST(Reduce, NoiseBelowTheToleranceCostsLittle) {
+  const BSplineCurve<3> noisy = helix(2e-4);
+  ReductionOptions options;
+  options.tolerance = 1e-3;
+  const auto reduced = reduce(noisy, options);
+  ASSERT_TRUE(reduced);
+  EXPECT_LE(reduced->curve.knots().control_point_count(), 37);
+  EXPECT_LE(largest_distance(noisy, reduced->curve), reduced->error_bound);
+}
+
+TEST(Reduce, LeavesNoiseAboveTheToleranceAlone) {
+  const BSplineCurve<3> noisy = helix(2e-4);
+  ReductionOptions options;
+  options.tolerance = 1e-6;
+  const auto reduced = reduce(noisy, options);
+  ASSERT_TRUE(reduced);
+  EXPECT_EQ(reduced->curve.knots(), noisy.knots());
+  EXPECT_EQ(reduced->error_bound, 0);
+}
+
+TEST(Reduce, OfARefinedCurveFindsTheOriginalKnots) {
+  Random random(1);
+  int inserted = 0;
+  for (int round = 0; round < 60; ++round) {
+    const KnotVector knots = random_knots(random, 2 + random.below(4), 2, false);
+    const BSplineCurve<3> curve = random_curve<3>(random, knots);
+    std::vector<double> added;
+    for (int k = 0; k < 12; ++k) added.push_back(random.uniform(knots.first(), knots.last()));
+    const auto fine = insert_knots(curve, added);
+    ASSERT_TRUE(fine);
+    ReductionOptions options;
+    options.tolerance = 1e-9;
+    const auto reduced = reduce(*fine, options);
+    ASSERT_TRUE(reduced);
+    EXPECT_EQ(reduced->curve.knots(), knots) << "round " << round;
+    inserted += 12;
+  }
+  EXPECT_GT(inserted, 0);
+}
+
+TEST(Reduce, KeepsItsPromiseOnRandomCurves) {
+  Random random(2);
+  int removed = 0;
+  for (int round = 0; round < 60; ++round) {
+    const KnotVector knots = random_knots(random, 1 + random.below(5));
+    Eigen::Matrix3Xd points = random_curve<3>(random, knots).control_points();
+    const BSplineCurve<3> curve(knots, points);
+    ReductionOptions options;
+    options.tolerance = 0.3;
+    const bool clamped = knots.knots().front() == knots.first();
+    options.held_first = options.held_last = clamped ? 1 : 0;
+    const auto reduced = reduce(curve, options);
+    ASSERT_TRUE(reduced) << reduced.error().message();
+    const double error = largest_distance(curve, reduced->curve, 500);
+    EXPECT_LE(error, reduced->error_bound + 1e-13);
+    EXPECT_LE(reduced->error_bound, options.tolerance);
+    removed += knots.control_point_count() - reduced->curve.knots().control_point_count();
+  }
+  EXPECT_GT(removed, 20);
+}
+
+TEST(Reduce, HoldsEndDerivativesExactly) {
+  const BSplineCurve<3> curve = helix(2e-4);
+  ReductionOptions options;
+  options.tolerance = 1e-2;
+  options.held_first = 3;
+  options.held_last = 2;
+  const auto reduced = reduce(curve, options);
+  ASSERT_TRUE(reduced);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_LT((reduced->curve.at(0, k) - curve.at(0, k)).norm(),
+              1e-9 * (1 + curve.at(0, k).norm()));
+    if (k < 2) {
+      EXPECT_LT((reduced->curve.at(1, k) - curve.at(1, k)).norm(),
+                1e-9 * (1 + curve.at(1, k).norm()));
+    }
+  }
+  EXPECT_LT(reduced->curve.knots().control_point_count(), 60);
+}
+
+TEST(Reduce, KeepsAKinkAndTheKnotsItIsTold) {
+  // A quintic with a corner at 0.5: the corner needs its multiplicity, the rest nearly nothing.
+  std::vector<double> breaks = spaced(0, 1, 41);
+  std::vector<Knot> distinct;
+  for (const double t : breaks) distinct.push_back({t, t == 0 || t == 1 ? 6 : t == 0.5 ? 5 : 1});
+  const KnotVector knots = *from_distinct(5, distinct);
+  const auto nodes = knots.greville();
+  Eigen::Matrix3Xd points(3, knots.control_point_count());
+  for (int i = 0; i < points.cols(); ++i) {
+    const double t = nodes[static_cast<std::size_t>(i)];
+    points.col(i) << t, std::abs(t - 0.5), std::sin(t);
+  }
+  const BSplineCurve<3> curve(knots, points);
+  ReductionOptions options;
+  options.tolerance = 1e-4;
+  options.kept = {{0.25, 1}};
+  const auto reduced = reduce(curve, options);
+  ASSERT_TRUE(reduced);
+  EXPECT_EQ(reduced->curve.knots().multiplicity(0.5), 5);
+  EXPECT_EQ(reduced->curve.knots().multiplicity(0.25), 1);
+  EXPECT_LE(reduced->curve.knots().control_point_count(), 16);
+  EXPECT_LE(largest_distance(curve, reduced->curve), options.tolerance);
+}
+
+TEST(Reduce, RefusesAToleranceThatIsNotPositiveAndTooManyHeldDerivatives) {
+  const BSplineCurve<3> curve = helix(0);
+  ReductionOptions options;
+  EXPECT_FALSE(reduce(curve, options));
+  options.tolerance = 1e-3;
+  options.held_last = 4;
+  const auto refused = reduce(curve, options);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message().find("held"), std::string::npos);
+}
+
+TEST(ReduceSurface, TubeStaysWithinToleranceInBothDirections) {
+  const KnotVector u = uniform_knots(5, 120);
+  const KnotVector v = uniform_knots(5, 40);
+  const auto us = u.greville();
+  const auto vs = v.greville();
+  Eigen::Matrix3Xd points(3, 120 * 40);
+  for (int i = 0; i < 120; ++i) {
+    for (int j = 0; j < 40; ++j) {
+      const double s = us[static_cast<std::size_t>(i)];
+      const double a = 2 * std::numbers::pi * vs[static_cast<std::size_t>(j)];
+      const double r = 2 + 0.3 * std::sin(9 * s);
+      points.col(i * 40 + j) << r * std::cos(a) + std::sin(4 * s), r * std::sin(a), 30 * s;
+    }
+  }
+  const BSplineSurface<3> tube = interpolate_at_greville<3>(u, v, points);
+  for (const double tolerance : {1e-2, 1e-3}) {
+    SurfaceReductionOptions options;
+    options.tolerance = tolerance;
+    const auto reduced = reduce(tube, options);
+    ASSERT_TRUE(reduced) << reduced.error().message();
+    const auto s = spaced(0, 1, 301);
+    const double error =
+        (evaluate_grid(tube, s, s).points() - evaluate_grid(reduced->surface, s, s).points())
+            .colwise()
+            .norm()
+            .maxCoeff();
+    EXPECT_LE(error, reduced->error_bound);
+    EXPECT_LE(reduced->error_bound, tolerance);
+    EXPECT_LT(reduced->surface.control_points().cols(), tolerance > 5e-3 ? 160 : 230);
+  }
+}
+
+TEST(KnotWeights, AreZeroForInsertedKnotsAlone) {
+  Random random(3);
+  const KnotVector knots = KnotVector::clamped(4, {0, 0.3, 0.6, 1});
+  const BSplineCurve<2> fine = *insert_knots(random_curve<2>(random, knots), {0.45, 0.8});
+  const auto weights = knot_weights(fine.knots(), fine.control_points().data(), 2, 2);
+  ASSERT_EQ(weights.size(), 4u);  // 0.3, 0.45, 0.6, 0.8
+  EXPECT_GT(weights[0], 1e-3);
+  EXPECT_LT(weights[1], 1e-14);
+  EXPECT_GT(weights[2], 1e-3);
+  EXPECT_LT(weights[3], 1e-14);
+}
+
+}  // namespace
+}  // namespace angiospline
