@@ -63,8 +63,9 @@ std::string ascii(const TriangleMesh& mesh, const std::vector<Solid>& solids) {
                                   mesh.points_mm.col(mesh.triangles(1, t)),
                                   mesh.points_mm.col(mesh.triangles(2, t))};
       const Vec3 n = unit_normal(p[0], p[1], p[2]);
-      fmt::format_to(out, "facet normal {:.9g} {:.9g} {:.9g}\nouter loop\n", n.x(), n.y(), n.z());
-      for (const Vec3& q : p) fmt::format_to(out, "vertex {} {} {}\n", q.x(), q.y(), q.z());
+      fmt::format_to(out, "facet normal {:.6g} {:.6g} {:.6g}\nouter loop\n", n.x(), n.y(), n.z());
+      for (const Vec3& q : p)
+        fmt::format_to(out, "vertex {:.9g} {:.9g} {:.9g}\n", q.x(), q.y(), q.z());
       fmt::format_to(out, "endloop\nendfacet\n");
     }
     fmt::format_to(out, "endsolid {}\n", solid.name);

@@ -21,9 +21,9 @@ struct StlOptions {
   StlGrouping grouping = StlGrouping::kParts;
 };
 
-// ASCII keeps every coordinate bit for bit and so stays closed when it is read back. Binary has
-// single precision, no names, and the part's index in each facet's attribute. Requires a sound
-// mesh.
+// ASCII has nine digits, and a point has the same digits wherever it is used, so that a closed mesh
+// stays closed when it is read back. Binary has single precision, no names, and the part's index in
+// each facet's attribute. Requires a sound mesh.
 std::string mesh_to_stl(const TriangleMesh& mesh, const StlOptions& options = {});
 
 // The mesh in the bytes of either format. Corners with equal coordinates become one point; facets

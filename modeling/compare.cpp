@@ -54,8 +54,14 @@ Share share_of(const TriangleMesh& mesh, Eigen::Index t, const TriangleTree& tre
       if (i + j + 1 < n) share.look(tree, corner + 2 * (u + v) / 3, weight);
     }
   }
-  for (const Vec3& p : {a, b, c}) share.look(tree, p, 0.0);
   return share;
+}
+
+// Corners count for the maximum only, each once.
+std::vector<char> corners_in_use(const TriangleMesh& mesh) {
+  std::vector<char> used(static_cast<std::size_t>(mesh.points_mm.cols()), 0);
+  for (const int p : mesh.triangles.reshaped()) used[static_cast<std::size_t>(p)] = 1;
+  return used;
 }
 
 Result<DirectedDistance> directed(const TriangleMesh& from, const TriangleTree& to, double spacing,
@@ -71,6 +77,19 @@ Result<DirectedDistance> directed(const TriangleMesh& from, const TriangleTree& 
       shares[t] = share_of(from, static_cast<Eigen::Index>(t), to, spacing);
     }
   });
+  const std::vector<char> used = corners_in_use(from);
+  std::vector<double> corner(used.size(), 0.0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, used.size(), 256), [&](const auto& range) {
+    if (stopped || progress.should_stop()) {
+      stopped = true;
+      return;
+    }
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      if (used[k] == 0) continue;
+      const Vec3 p = from.points_mm.col(static_cast<Eigen::Index>(k));
+      corner[k] = to.nearest(p).squared_distance_mm2;
+    }
+  });
   if (stopped) return fail(cancelled("compare"));
   Share all;  // summed in the order of triangles: the same on any number of threads
   for (const Share& share : shares) {
@@ -81,6 +100,11 @@ Result<DirectedDistance> directed(const TriangleMesh& from, const TriangleTree& 
       all.squared_max = share.squared_max;
       all.worst = share.worst;
     }
+  }
+  for (std::size_t k = 0; k < corner.size(); ++k) {
+    if (corner[k] <= all.squared_max) continue;
+    all.squared_max = corner[k];
+    all.worst = from.points_mm.col(static_cast<Eigen::Index>(k));
   }
   DirectedDistance distance{std::sqrt(all.squared_max), 0.0, 0.0, all.worst};
   if (all.area > 0) {

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
 #include "kernel/grid.h"
+#include "modeling/mesh_spacing.h"
 
 namespace angiospline {
 namespace {
@@ -16,56 +18,6 @@ namespace {
 constexpr double kMostTriangles = 5e7;  // some 5 GB; a whole brain at the defaults needs 1e6
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-// Wanted segments for each unit of a parameter, as a polyline over sorted parameters.
-struct Density {
-  std::vector<double> parameters;
-  std::vector<double> values;
-
-  double operator()(double t) const {
-    const auto above = std::upper_bound(parameters.begin(), parameters.end(), t);
-    if (above == parameters.begin()) return values.front();
-    if (above == parameters.end()) return values.back();
-    const auto k = static_cast<std::size_t>(above - parameters.begin());
-    const double s = (t - parameters[k - 1]) / (parameters[k] - parameters[k - 1]);
-    return (1 - s) * values[k - 1] + s * values[k];
-  }
-};
-
-// `samples` in [0, 1] that divide the integral of a sampled density (at equal steps) evenly; at
-// least `least` segments, and as many as the integral asks for. First 0, last 1.
-std::vector<double> equidistribute(const std::vector<double>& density, int least) {
-  const std::size_t steps = density.size() - 1;
-  std::vector<double> sum(density.size(), 0.0);
-  for (std::size_t i = 1; i <= steps; ++i) {
-    sum[i] = sum[i - 1] + 0.5 * (density[i - 1] + density[i]) / static_cast<double>(steps);
-  }
-  // The hair taken off keeps a count from depending on the last bit of a symmetric shape.
-  const int count = std::max(least, static_cast<int>(std::ceil(sum.back() - 1e-6)));
-  std::vector<double> samples{0.0};
-  std::size_t i = 1;
-  for (int k = 1; k < count; ++k) {
-    const double wanted = sum.back() * k / count;
-    while (i < steps && sum[i] < wanted) ++i;
-    const double width = sum[i] - sum[i - 1];
-    const double inside = width > 0 ? (wanted - sum[i - 1]) / width : 0.5;
-    samples.push_back((static_cast<double>(i - 1) + inside) / static_cast<double>(steps));
-  }
-  samples.push_back(1.0);
-  return samples;
-}
-
-std::vector<double> samples_of_spans(const KnotVector& knots, int each) {
-  std::vector<double> samples;
-  const std::vector<double> breaks = knots.breakpoints();
-  for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
-    for (int k = 0; k < each; ++k) {
-      samples.push_back(breaks[i] + (breaks[i + 1] - breaks[i]) * k / each);
-    }
-  }
-  samples.push_back(breaks.back());
-  return samples;
-}
 
 // A curve where patches meet or the surface ends: side a, and side b unless it lies on a rim.
 struct Edge {
@@ -82,46 +34,6 @@ struct EdgeUse {
   double from;
 };
 
-// What a patch asks for in each direction.
-struct PatchDemand {
-  Density u;
-  Density v;
-};
-
-PatchDemand demand_of(const BSplineSurface<3>& surface, double tolerance_mm, double longest_mm) {
-  PatchDemand demand{{samples_of_spans(surface.u(), 6), {}},
-                     {samples_of_spans(surface.v(), 6), {}}};
-  const std::vector<double>& us = demand.u.parameters;
-  const std::vector<double>& vs = demand.v.parameters;
-  demand.u.values.assign(us.size(), 0.0);
-  demand.v.values.assign(vs.size(), 0.0);
-  const SurfaceGrid<3> grid = evaluate_grid(surface, us, vs, 2);
-  for (std::size_t i = 0; i < us.size(); ++i) {
-    for (std::size_t j = 0; j < vs.size(); ++j) {
-      const auto c = static_cast<Eigen::Index>(i * vs.size() + j);
-      const Vec3 su = grid.partial(1, 0).col(c);
-      const Vec3 sv = grid.partial(0, 1).col(c);
-      const Vec3 cross = su.cross(sv);
-      const double lu = su.norm();
-      const double lv = sv.norm();
-      // Where the patch is singular the whole second derivative stands in for its normal part.
-      const bool regular = cross.norm() > 1e-9 * lu * lv;
-      const Vec3 n = regular ? Vec3(cross.normalized()) : Vec3::Zero();
-      const auto normal_part = [&](const Vec3& d) {
-        return regular ? std::abs(n.dot(d)) : d.norm();
-      };
-      const double twist = normal_part(grid.partial(1, 1).col(c));
-      const double uu = normal_part(grid.partial(2, 0).col(c)) + (lv > 0 ? twist * lu / lv : 0);
-      const double vv = normal_part(grid.partial(0, 2).col(c)) + (lu > 0 ? twist * lv / lu : 0);
-      demand.u.values[i] =
-          std::max({demand.u.values[i], std::sqrt(uu / (4 * tolerance_mm)), lu / longest_mm});
-      demand.v.values[j] =
-          std::max({demand.v.values[j], std::sqrt(vv / (4 * tolerance_mm)), lv / longest_mm});
-    }
-  }
-  return demand;
-}
-
 bool runs_along_v(PatchSide side) { return side == PatchSide::kU0 || side == PatchSide::kU1; }
 
 class Tessellator {
@@ -130,7 +42,7 @@ class Tessellator {
       : network_(network), options_(options) {}
 
   Result<Tessellation> run(const Progress& progress) {
-    measure_demands();
+    measure_spacings();
     const double estimate = triangle_estimate();
     if (!(estimate <= kMostTriangles)) {
       return fail({ErrorKind::kBadInput, "the tolerance asks for too many triangles", "tessellate",
@@ -158,29 +70,21 @@ class Tessellator {
     return 0.05 * (p.rowwise().maxCoeff() - p.rowwise().minCoeff()).norm();
   }
 
-  void measure_demands() {
+  void measure_spacings() {
     const double fallback = fallback_radius_mm();
     for (std::size_t p = 0; p < network_.patches.size(); ++p) {
       surfaces_.push_back(patch_surface(network_, static_cast<int>(p)));
       const double known = network_.regions[at(network_.patches[p].region)].radius_mm;
       const double radius = known > 0 ? known : fallback;
-      demands_.push_back(
-          demand_of(surfaces_.back(),
-                    std::min(options_.chord_tolerance * radius, options_.chord_tolerance_mm),
-                    options_.longest_edge * radius));
+      spacings_.push_back(spacing_of(surfaces_.back(), radius, options_));
     }
   }
 
   double triangle_estimate() const {
-    const auto integral = [](const Density& d) {
-      double sum = 0;
-      for (std::size_t k = 1; k < d.values.size(); ++k) {
-        sum += 0.5 * (d.values[k] + d.values[k - 1]) * (d.parameters[k] - d.parameters[k - 1]);
-      }
-      return sum + 3;
-    };
     double sum = 0;
-    for (const PatchDemand& d : demands_) sum += 2 * integral(d.u) * integral(d.v);
+    for (const PatchSpacing& d : spacings_) {
+      sum += 2 * (d.u.integral() + 3) * (d.v.integral() + 3);
+    }
     return sum;
   }
 
@@ -264,8 +168,8 @@ class Tessellator {
   }
 
   const Density& density_along(const Side& side) const {
-    const PatchDemand& demand = demands_[at(side.patch)];
-    return runs_along_v(side.side) ? demand.v : demand.u;
+    const PatchSpacing& spacing = spacings_[at(side.patch)];
+    return runs_along_v(side.side) ? spacing.v : spacing.u;
   }
 
   void sample_edges() {
@@ -370,8 +274,8 @@ class Tessellator {
 
   void mesh_patch(int patch) {
     const Patch& p = network_.patches[at(patch)];
-    const std::vector<double> us = interior_lines(p.u, demands_[at(patch)].u);
-    const std::vector<double> vs = interior_lines(p.v, demands_[at(patch)].v);
+    const std::vector<double> us = interior_lines(p.u, spacings_[at(patch)].u);
+    const std::vector<double> vs = interior_lines(p.v, spacings_[at(patch)].v);
     const SurfaceGrid<3> grid = evaluate_grid(surfaces_[at(patch)], us, vs, 1);
     const int first = static_cast<int>(points_.size());
     const int rows = static_cast<int>(us.size());
@@ -420,13 +324,54 @@ class Tessellator {
       }
     }
     for (std::size_t r = 0; r < segments.size(); ++r) {
-      Vec3 sum = Vec3::Zero();
-      for (const auto& [a, b] : segments[r]) sum += points_[at(a)];
-      const int center = add_point(-1, Vec2::Zero(), sum / static_cast<double>(segments[r].size()));
-      normals_.back() = network_.rims[r].normal;
-      for (const auto& [a, b] : segments[r]) {
-        add_triangle(a, b, center, first_part + static_cast<int>(r));
+      fill_rim(closed_chain(std::move(segments[r])), network_.rims[r],
+               first_part + static_cast<int>(r));
+    }
+  }
+
+  // Directed segments as one loop, from the segment that was found first.
+  static std::vector<int> closed_chain(std::vector<std::array<int, 2>> segments) {
+    const int start = segments.front()[0];
+    std::sort(segments.begin(), segments.end());
+    std::vector<int> loop;
+    int point = start;
+    do {
+      loop.push_back(point);
+      const auto next = std::lower_bound(segments.begin(), segments.end(), std::array{point, -1});
+      point = (*next)[1];
+    } while (point != start && loop.size() < segments.size());
+    return loop;
+  }
+
+  // Rings towards the middle, one segment's length apart, with ever fewer points; then a fan.
+  void fill_rim(const std::vector<int>& loop, const Rim& rim, int part) {
+    const auto count = static_cast<double>(loop.size());
+    Vec3 center = Vec3::Zero();
+    for (const int p : loop) center += points_[at(p)] / count;
+    const int rings = std::max(1, static_cast<int>(std::lround(count / (2 * std::numbers::pi))));
+    const auto on_loop = [&](double s) {  // at fraction s of the loop's segments
+      const double k = s * count;
+      const auto i = std::min(static_cast<std::size_t>(k), loop.size() - 1);
+      const Vec3 a = points_[at(loop[i])];
+      return Vec3(a +
+                  (k - static_cast<double>(i)) * (points_[at(loop[(i + 1) % loop.size()])] - a));
+    };
+    Chain outer;
+    for (std::size_t k = 0; k <= loop.size(); ++k) {
+      outer.push(static_cast<double>(k) / count, loop[k % loop.size()]);
+    }
+    for (int ring = 1; ring <= rings; ++ring) {
+      const double inward = static_cast<double>(ring) / rings;
+      const int points = ring == rings ? 1 : std::max(5, static_cast<int>(count * (1 - inward)));
+      Chain inner;
+      for (int k = 0; k < points; ++k) {
+        const double s = static_cast<double>(k) / points;
+        inner.push(s, add_point(-1, Vec2::Zero(), center + (1 - inward) * (on_loop(s) - center)));
+        normals_.back() = rim.normal;
       }
+      if (points > 1) inner.push(1.0, inner.points.front());
+      zip(outer, inner, part);
+      outer = std::move(inner);
     }
   }
 
@@ -463,7 +408,7 @@ class Tessellator {
   const SurfaceNetwork& network_;
   const TessellationOptions& options_;
   std::vector<BSplineSurface<3>> surfaces_;
-  std::vector<PatchDemand> demands_;
+  std::vector<PatchSpacing> spacings_;
   std::vector<Edge> edges_;
   std::vector<std::array<std::vector<EdgeUse>, 4>> uses_;
   std::vector<Vec3> points_;

@@ -10,16 +10,16 @@
 
 namespace angiospline {
 
+// Lengths are in local radii: the smallest vessel radius of the region, or the surface's radius of
+// curvature where that is larger, so that one figure serves trunk and twig and a taper between
+// them.
 struct TessellationOptions {
-  // Goal for the distance between triangles and surface, in vessel radii of the region; a circle
-  // gets 2 pi / acos(1 - chord_tolerance) chords or more.
-  double chord_tolerance = 0.01;
+  double chord_tolerance = 0.01;    // goal for the distance between triangles and surface
   double chord_tolerance_mm = 1e9;  // the same in mm; the smaller one counts
-  double longest_edge =
-      0.75;  // of the wall's triangles, in radii: no slivers along straight vessels
+  double longest_edge = 0.75;       // of the wall's triangles: no slivers along straight vessels
 };
 
-// Where on the network a point of the mesh lies; a cap's centre has patch -1.
+// Where on the network a point of the mesh lies; inside a cap the patch is -1.
 struct SurfacePoint {
   int patch = -1;
   Vec2 uv = Vec2::Zero();
@@ -32,7 +32,7 @@ struct Tessellation {
 
 // A mesh whose patches share the points of their joins and whose rims are closed by plane caps: it
 // is closed, oriented outward and has the network's topology by construction, whatever the
-// geometry. All points but the caps' centres lie on the surface. Edges are divided by the larger
+// geometry. All points but those inside caps lie on the surface. Edges are divided by the larger
 // demand of their two sides; the spacing comes from Filip, Magedson, Markot (1986): error <= (hu^2
 // |n.Suu| + 2 hu hv |n.Suv| + hv^2 |n.Svv|) / 8, with the second derivatives sampled, not bounded.
 // Caps must be star-shaped about the mean of their rim. Requires positive options.

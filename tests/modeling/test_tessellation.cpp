@@ -108,7 +108,7 @@ TEST(Tessellate, KeepsTheChordTolerance) {
                          .normalized();
       worst = std::max(worst, std::abs(n.dot(on_surface - p)));
     }
-    EXPECT_GT(checked, 100);
+    EXPECT_GT(checked, 50);
     const double radius = c.network.regions[0].radius_mm;
     EXPECT_LT(worst, kTolerance * radius);
     EXPECT_GT(worst, 0.1 * kTolerance * radius);  // and is not wasteful
