@@ -15,7 +15,7 @@
 namespace angiospline {
 namespace {
 
-constexpr double kMostTriangles = 5e7;  // some 5 GB; a whole brain at the defaults needs 1e6
+constexpr double kMostTriangles = 2e7;  // some 3 GB; a whole brain at the defaults needs 1e6
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 

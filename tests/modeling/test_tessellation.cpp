@@ -170,7 +170,7 @@ TEST(Tessellate, RefusesWhatIsBrokenOrTooFineOrStopped) {
   not_finite.control_points_mm(1, 7) = std::nan("");
   ASSERT_FALSE(tessellate(not_finite));
   EXPECT_EQ(tessellate(not_finite).error().where, "control point 7");
-  EXPECT_FALSE(tessellate(samples::tube(), {.chord_tolerance = 1e-12}));
+  EXPECT_FALSE(tessellate(samples::tube(), {.chord_tolerance = 1e-14}));
   const Progress stop{{}, [] { return true; }};
   ASSERT_FALSE(tessellate(samples::tube(), {}, stop));
   EXPECT_EQ(tessellate(samples::tube(), {}, stop).error().kind, ErrorKind::kCancelled);
