@@ -81,26 +81,6 @@ struct Moments {
   }
 };
 
-// The threshold that splits values into two classes with the largest variance between them (Otsu
-// 1979), exact: the values are sorted. Returns the lowest value of the upper class.
-double otsu_threshold(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  double total = 0;
-  for (const double v : values) total += v - values.front();
-  double below = 0, best = -1, threshold = values.front();
-  for (std::size_t k = 1; k < values.size(); ++k) {
-    below += values[k - 1] - values.front();
-    if (values[k] == values[k - 1]) continue;
-    const double n0 = static_cast<double>(k), n1 = static_cast<double>(values.size() - k);
-    const double gap = below / n0 - (total - below) / n1;
-    if (n0 * n1 * gap * gap > best) {
-      best = n0 * n1 * gap * gap;
-      threshold = values[k];
-    }
-  }
-  return threshold;
-}
-
 template <typename T>
 class Grower {
  public:
@@ -313,16 +293,21 @@ template <typename T>
 bool Grower<T>::is_vessel(const Candidate& c) {
   const Box box = box_around(c.at, half_);
   const Moments s1 = labelled_around(box, c.grey);
-  const double threshold = c.grey + s1.mean() - options_.deviations * s1.deviation();
+  const double mean = c.grey + s1.mean();
+  const double threshold = mean - options_.deviations * s1.deviation();
   const double in_image = sign_ * threshold;
   if (report_.examined == 0) report_.threshold_min = report_.threshold_max = in_image;
   report_.threshold_min = std::min(report_.threshold_min, in_image);
   report_.threshold_max = std::max(report_.threshold_max, in_image);
   threshold_sum_ += in_image;
   ++report_.examined;
-  if (options_.background_level &&
-      c.grey >= (c.grey + s1.mean() + sign_ * *options_.background_level) / 2)
-    return true;
+  if (options_.background_level) {
+    // Where the edge of a vessel lies: half way, less where M is generous.
+    constexpr double kSurely = 0.5, kHardly = 0.45;
+    const double level = sign_ * *options_.background_level;
+    if (c.grey >= level + kSurely * (mean - level)) return true;
+    if (c.grey < level + kHardly * (mean - level)) return false;
+  }
   return mean_of_brightest_connected(c.at, box) >= threshold;
 }
 
@@ -382,6 +367,25 @@ Result<void> check(const GrowOptions& o, const std::vector<Vec3>& seeds) {
 }
 
 }  // namespace
+
+double otsu_threshold(std::vector<double> values) {
+  EXPECTS(!values.empty());
+  std::sort(values.begin(), values.end());
+  double total = 0;
+  for (const double v : values) total += v - values.front();
+  double below = 0, best = -1, threshold = values.front();
+  for (std::size_t k = 1; k < values.size(); ++k) {
+    below += values[k - 1] - values.front();
+    if (values[k] == values[k - 1]) continue;
+    const double n0 = static_cast<double>(k), n1 = static_cast<double>(values.size() - k);
+    const double gap = below / n0 - (total - below) / n1;
+    if (n0 * n1 * gap * gap > best) {
+      best = n0 * n1 * gap * gap;
+      threshold = values[k];
+    }
+  }
+  return threshold;
+}
 
 template <typename T>
 Result<Segmentation> grow_region(const Image<T>& image, const std::vector<Vec3>& seeds_mm,

@@ -1,0 +1,239 @@
+#include "recovery/segmentation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "recovery/gaussian.h"
+#include "recovery/morphology.h"
+#include "recovery/vesselness.h"
+
+namespace angiospline {
+namespace {
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// A cube around a voxel, vessels bright, not-finite voxels left out of the values.
+struct Cube {
+  Image<double> grey;  // NaN where not finite
+  Voxel seed;          // within it
+  std::vector<double> values;
+};
+
+Cube cube_around(const AnyImage& image, const Voxel& centre, double half_mm, double sign) {
+  const ImageGrid& grid = grid_of(image);
+  Voxel low, size;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const int half =
+        static_cast<int>(std::lround(half_mm / grid.spacing_mm[static_cast<Eigen::Index>(i)]));
+    low[i] = std::max(0, centre[i] - half);
+    size[i] = std::min(grid.size[i] - 1, centre[i] + half) - low[i] + 1;
+  }
+  Cube cube;
+  cube.grey.grid.size = size;
+  cube.seed = {centre[0] - low[0], centre[1] - low[1], centre[2] - low[2]};
+  for (int z = 0; z < size[2]; ++z)
+    for (int y = 0; y < size[1]; ++y)
+      for (int x = 0; x < size[0]; ++x) {
+        const double v = sign * value_at(image, {low[0] + x, low[1] + y, low[2] + z});
+        cube.grey.voxels.push_back(v);
+        if (std::isfinite(v)) cube.values.push_back(v);
+      }
+  return cube;
+}
+
+// Voxels of the seed's component whose six neighbours in the cube belong to it too.
+std::vector<double> inside_of(const Cube& cube, const Components& parts, std::int32_t label) {
+  std::vector<double> inside;
+  for (std::size_t i = 0; i < cube.grey.voxels.size(); ++i) {
+    if (parts.labels.voxels[i] != label) continue;
+    const Voxel v = cube.grey.grid.voxel(i);
+    bool deep = true;
+    for (std::size_t k = 0; k < 3; ++k)
+      for (const int step : {-1, 1}) {
+        Voxel n = v;
+        n[k] += step;
+        deep = deep && (!cube.grey.grid.contains(n) || parts.labels[n] == label);
+      }
+    if (deep) inside.push_back(cube.grey.voxels[i]);
+  }
+  return inside;
+}
+
+SeedLevels levels_in(const Cube& cube, double threshold, double half_mm, const ImageGrid& grid) {
+  Mask bright(cube.grey.grid);
+  std::vector<double> background;
+  for (std::size_t i = 0; i < bright.voxels.size(); ++i) {
+    bright.voxels[i] = cube.grey.voxels[i] >= threshold;
+    if (cube.grey.voxels[i] < threshold) background.push_back(cube.grey.voxels[i]);
+  }
+  const Components parts = connected_components(bright, Neighbours::kCorners26);
+  const std::int32_t label = parts.labels[cube.seed];
+  std::vector<double> vessel = inside_of(cube, parts, label);
+  if (vessel.size() < 8) {  // too thin to have an inside
+    vessel.clear();
+    for (std::size_t i = 0; i < bright.voxels.size(); ++i)
+      if (parts.labels.voxels[i] == label) vessel.push_back(cube.grey.voxels[i]);
+  }
+  SeedLevels out;
+  const double n = static_cast<double>(vessel.size());
+  out.vessel = std::accumulate(vessel.begin(), vessel.end(), 0.0) / n;
+  double squares = 0;
+  for (const double v : vessel) squares += (v - out.vessel) * (v - out.vessel);
+  out.vessel_deviation = std::sqrt(squares / n);
+  out.background = median(background);
+  for (double& v : background) v = std::abs(v - out.background);
+  out.background_deviation = 1.4826 * median(background);
+  const double volume =
+      static_cast<double>(parts.list[static_cast<std::size_t>(label - 1)].voxels) *
+      grid.spacing_mm.prod();
+  out.radius_mm = std::sqrt(volume / (2 * half_mm * std::numbers::pi));
+  return out;
+}
+
+// Grey values (vessels bright) around one voxel; none if no cube up to 40 voxels shows a
+// background.
+std::optional<SeedLevels> levels_at(const AnyImage& image, const Voxel& seed, double sign) {
+  const ImageGrid& grid = grid_of(image);
+  const double voxel = grid.spacing_mm.minCoeff();
+  for (double half = 5; half <= 40; half *= 1.4) {
+    const Cube cube = cube_around(image, seed, half * voxel, sign);
+    if (cube.values.size() < 27) continue;
+    const double threshold = otsu_threshold(cube.values);
+    const auto below = std::count_if(cube.values.begin(), cube.values.end(),
+                                     [&](double v) { return v < threshold; });
+    if (static_cast<double>(below) < 0.6 * static_cast<double>(cube.values.size())) continue;
+    if (!(cube.grey[cube.seed] >= threshold)) continue;
+    return levels_in(cube, threshold, half * voxel, grid);
+  }
+  return std::nullopt;
+}
+
+SeedLevels median_of(const std::vector<SeedLevels>& all) {
+  SeedLevels out;
+  for (double SeedLevels::*field :
+       {&SeedLevels::vessel, &SeedLevels::vessel_deviation, &SeedLevels::background,
+        &SeedLevels::background_deviation, &SeedLevels::radius_mm}) {
+    std::vector<double> values;
+    for (const SeedLevels& l : all) values.push_back(l.*field);
+    out.*field = median(std::move(values));
+  }
+  return out;
+}
+
+Voxel brightest_near(const AnyImage& image, const Vec3& seed_mm, int reach, double sign) {
+  const ImageGrid& grid = grid_of(image);
+  const Vec3 at = grid.index_vox(seed_mm);
+  Voxel best{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
+             static_cast<int>(std::lround(at[2]))};
+  const Voxel middle = best;
+  for (int z = -reach; z <= reach; ++z)
+    for (int y = -reach; y <= reach; ++y)
+      for (int x = -reach; x <= reach; ++x) {
+        const Voxel v{middle[0] + x, middle[1] + y, middle[2] + z};
+        if (grid.contains(v) && sign * value_at(image, v) > sign * value_at(image, best)) best = v;
+      }
+  return best;
+}
+
+// Fills in what the caller left open, and says so.
+GrowOptions chosen(const AnyImage& image, const SegmentOptions& options, SegmentReport& report) {
+  GrowOptions grow;
+  grow.polarity = options.polarity;
+  grow.max_examined = options.max_examined;
+  const double sign = options.polarity == Polarity::kBright ? 1 : -1;
+  std::vector<SeedLevels> all;
+  if (!options.neighbourhood_vox || !options.deviations || !options.background)
+    for (const Vec3& seed : report.seeds_mm) {
+      const Voxel at = brightest_near(image, seed, 0, sign);
+      if (!grid_of(image).contains(at)) continue;  // grow_region says so
+      const auto levels =
+          levels_at(image, brightest_near(image, seed, grow.seed_search_vox, sign), sign);
+      if (levels) all.push_back(*levels);
+    }
+  if (!all.empty()) {
+    SeedLevels l = median_of(all);
+    const double contrast = l.vessel - l.background;
+    const double r_vox = l.radius_mm / grid_of(image).spacing_mm.minCoeff();
+    grow.neighbourhood_vox = std::clamp(2 * static_cast<int>(std::lround(r_vox)) + 1, 5, 11);
+    grow.deviations = 2;
+    if (l.vessel_deviation > 0)
+      grow.deviations = std::clamp(0.5 * contrast / l.vessel_deviation, 1.0, 2.0);
+    const double floor = std::clamp(2 * l.background_deviation, 0.2 * contrast, 0.4 * contrast);
+    if (!options.background) {
+      grow.background = sign * (l.background + floor);
+      grow.background_level = sign * l.background;
+    }
+    l.vessel *= sign;
+    l.background *= sign;
+    report.levels = l;
+    report.choices.push_back(fmt::format(
+        "at the seeds the vessel is {:.4g} +- {:.3g}, its background {:.4g} +- {:.3g}, its radius "
+        "about {:.2g} mm",
+        l.vessel, l.vessel_deviation, l.background, l.background_deviation, l.radius_mm));
+    if (!options.neighbourhood_vox)
+      report.choices.push_back(fmt::format("N = {}", grow.neighbourhood_vox));
+    if (!options.deviations) report.choices.push_back(fmt::format("M = {:.3g}", grow.deviations));
+    if (grow.background)
+      report.choices.push_back(fmt::format("background threshold {:.4g}", *grow.background));
+  } else if (!options.neighbourhood_vox || !options.deviations || !options.background) {
+    report.warnings.push_back(fmt::format(
+        "no contrast was found around the seeds: N = {}, M = {:.3g}, no background threshold",
+        grow.neighbourhood_vox, grow.deviations));
+  }
+  if (options.neighbourhood_vox) grow.neighbourhood_vox = *options.neighbourhood_vox;
+  if (options.deviations) grow.deviations = *options.deviations;
+  if (options.background) grow.background = options.background;
+  return grow;
+}
+
+}  // namespace
+
+Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const Progress& progress) {
+  SegmentReport report;
+  report.seeds_mm = options.seeds_mm;
+  if (options.seeds_mm.empty()) {
+    SeedOptions seed_options;
+    seed_options.polarity = options.polarity;
+    Result<std::vector<Vec3>> seeds = find_seeds(image, seed_options, progress);
+    if (!seeds) return fail(seeds.error());
+    if (seeds->empty())
+      return fail({ErrorKind::kFailed,
+                   "no vessel was found",
+                   "segment",
+                   {},
+                   "nothing in the image looks like a tube: give a seed"});
+    report.seeds_mm = std::move(*seeds);
+    report.seeds_found = true;
+    report.choices.push_back(fmt::format("{} seeds in the cores of the most tubular structures",
+                                         report.seeds_mm.size()));
+  }
+  if (progress.should_stop()) return fail(cancelled("segment"));
+  image = smoothed(std::move(image), options.smoothing_vox * grid_of(image).spacing_mm.minCoeff());
+  GrowOptions grow = chosen(image, options, report);
+  if (report.seeds_found) grow.seed_search_vox = 2;
+  report.neighbourhood_vox = grow.neighbourhood_vox;
+  report.deviations = grow.deviations;
+  report.background = grow.background.value_or(0);
+  Result<Segmentation> grown = grow_region(image, report.seeds_mm, grow, progress);
+  if (!grown) return fail(grown.error());
+  report.grown = std::move(grown->report);
+  if (report.grown.limit_reached)
+    report.warnings.push_back(
+        fmt::format("growing stopped after {} voxels examined", report.grown.examined));
+  Filled holes = fill_holes(grown->mask, options.largest_hole_vox);
+  Filled cavities = fill_cavities(holes.mask);
+  report.filled_voxels = holes.voxels + cavities.voxels;
+  report.components = component_count(cavities.mask, Neighbours::kCorners26);
+  return Segmented{std::move(cavities.mask), std::move(report)};
+}
+
+}  // namespace angiospline

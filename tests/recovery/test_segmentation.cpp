@@ -1,0 +1,252 @@
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "recovery/gaussian.h"
+#include "recovery/metrics.h"
+#include "recovery/morphology.h"
+#include "recovery/phantom.h"
+#include "recovery/segmentation.h"
+#include "recovery/vesselness.h"
+
+namespace angiospline {
+namespace {
+
+Phantom noisy_tree(double snr) {
+  PhantomOptions o;
+  o.field_mm = 160;
+  o.radius_max_mm = 7;
+  o.radius_min_mm = 2.5;
+  o.ends = 6;
+  o.snr = snr;
+  o.seed = 3;
+  auto p = make_phantom(PhantomKind::kRandomTree, o);
+  EXPECT_TRUE(p.has_value());
+  return *p;
+}
+
+TEST(Gaussian, KeepsConstantsAndTheSumOfGreyValues) {
+  ImageGrid grid;
+  grid.size = {21, 21, 21};
+  grid.spacing_mm = Vec3(1, 1, 2);
+  const Image<float> flat(grid, 7.0F);
+  for (const float v : smoothed(flat, 1.3).voxels) ASSERT_NEAR(v, 7, 1e-5);
+  Image<float> point(grid);
+  point[{10, 10, 10}] = 1;
+  const Image<float> spread = smoothed(point, 1.5);
+  double sum = 0;
+  Vec3 variance = Vec3::Zero();
+  for (std::size_t i = 0; i < spread.voxels.size(); ++i) {
+    const Voxel v = grid.voxel(i);
+    const Vec3 d = grid.spacing_mm.cwiseProduct(Vec3(v[0] - 10, v[1] - 10, v[2] - 10));
+    sum += static_cast<double>(spread.voxels[i]);
+    variance += d.cwiseProduct(d) * static_cast<double>(spread.voxels[i]);
+  }
+  EXPECT_NEAR(sum, 1, 1e-5);
+  // Isotropic in mm whatever the spacing; the cut at three deviations takes 3 % of the variance.
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(variance[i] / (1.5 * 1.5), 0.97, 0.05) << i;
+}
+
+TEST(Gaussian, LeavesVoxelsThatAreNotFiniteOut) {
+  ImageGrid grid;
+  grid.size = {9, 9, 9};
+  Image<float> image(grid, 5.0F);
+  image[{4, 4, 4}] = std::numeric_limits<float>::quiet_NaN();
+  image[{0, 0, 0}] = std::numeric_limits<float>::infinity();
+  const Image<float> out = smoothed(image, 1.0);
+  for (std::size_t i = 0; i < out.voxels.size(); ++i)
+    if (std::isfinite(image.voxels[i])) {
+      ASSERT_NEAR(out.voxels[i], 5, 1e-5);
+    } else {
+      ASSERT_FALSE(std::isfinite(out.voxels[i]));
+    }
+}
+
+TEST(Gaussian, RoundsIntegersAndLeavesFlatAxesAlone) {
+  Image<std::uint8_t> slice;
+  slice.grid.size = {5, 1, 1};
+  slice.voxels = {0, 0, 255, 0, 0};
+  const Image<std::uint8_t> out = smoothed(slice, 0.5);
+  EXPECT_EQ(out.voxels, (std::vector<std::uint8_t>{0, 27, 201, 27, 0}));
+  EXPECT_EQ(smoothed(slice, 0.0).voxels, slice.voxels);
+}
+
+TEST(Vesselness, AnswersToTubesAndNotToSheetsOrBalls) {
+  ImageGrid grid;
+  grid.size = {41, 41, 41};
+  Image<float> tube(grid), sheet(grid), ball(grid);
+  for (std::size_t i = 0; i < tube.voxels.size(); ++i) {
+    const Voxel v = grid.voxel(i);
+    const double x = v[0] - 20, y = v[1] - 20, z = v[2] - 20;
+    tube.voxels[i] = x * x + y * y <= 9 ? 100.0F : 0.0F;
+    sheet.voxels[i] = std::abs(x) <= 3 ? 100.0F : 0.0F;
+    ball.voxels[i] = x * x + y * y + z * z <= 9 ? 100.0F : 0.0F;
+  }
+  const auto middle = [](const Image<float>& image) { return (*vesselness(image))[{20, 20, 20}]; };
+  EXPECT_GT(middle(tube), 3 * middle(sheet));
+  EXPECT_GT(middle(tube), 3 * middle(ball));
+  EXPECT_GT(middle(tube), 10);
+  Image<float> negative = tube;
+  for (float& v : negative.voxels) v = -v;
+  EXPECT_EQ(middle(negative), 0);
+}
+
+TEST(Seeds, LieInTheVesselWhateverTheGrid) {
+  for (const Vec3& spacing : {Vec3(1, 1, 1), Vec3(0.8, 0.8, 2)}) {
+    PhantomOptions o;
+    o.spacing_mm = spacing;
+    o.snr = 6;
+    o.origin_mm = Vec3(-50, 20, 7);
+    o.direction << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+    const auto p = make_phantom(PhantomKind::kBifurcation, o);
+    ASSERT_TRUE(p.has_value());
+    const auto seeds = find_seeds(p->image);
+    ASSERT_TRUE(seeds.has_value());
+    ASSERT_FALSE(seeds->empty());
+    for (const Vec3& seed : *seeds) {
+      const Vec3 at = p->truth.grid.index_vox(seed);
+      const Voxel v{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
+                    static_cast<int>(std::lround(at[2]))};
+      EXPECT_EQ(p->truth[v], 1);
+    }
+  }
+}
+
+TEST(Seeds, AreNoneInAnImageOfOneGreyValue) {
+  ImageGrid grid;
+  grid.size = {20, 20, 20};
+  const auto seeds = find_seeds(Image<float>(grid, 3.0F));
+  ASSERT_TRUE(seeds.has_value());
+  EXPECT_TRUE(seeds->empty());
+  const auto s = segment(Image<float>(grid, 3.0F));
+  ASSERT_FALSE(s.has_value());
+  EXPECT_EQ(s.error().what, "no vessel was found");
+}
+
+TEST(Segment, FindsANoisyTreeWithoutAnyParameter) {
+  for (const double snr : {8.0, 4.0}) {
+    const Phantom p = noisy_tree(snr);
+    const auto s = segment(p.image);
+    ASSERT_TRUE(s.has_value()) << s.error().message();
+    EXPECT_TRUE(s->report.seeds_found);
+    EXPECT_TRUE(s->report.warnings.empty());
+    EXPECT_GE(s->report.choices.size(), 4U);  // it says what it chose
+    const auto c = compare_masks(p.truth, s->mask);
+    ASSERT_TRUE(c.has_value());
+    EXPECT_GT(c->dice, 0.96) << snr;
+    EXPECT_EQ(c->result_topology.components, 1);
+    EXPECT_EQ(c->result_topology.cavities, 0);
+    EXPECT_LE(c->result_topology.cycles, 2);
+    EXPECT_LT(c->surface->mean_mm, 0.5);
+  }
+}
+
+TEST(Segment, HasNoCliffInM) {
+  const Phantom p = noisy_tree(6);
+  double least = 1, most = 0;
+  for (const double m : {1.0, 1.5, 2.0, 2.5, 3.0}) {
+    SegmentOptions o;
+    o.seeds_mm = {p.tree.branches.front().points_mm.col(8)};
+    o.deviations = m;
+    const auto s = segment(p.image, o);
+    ASSERT_TRUE(s.has_value());
+    const double dice = compare_masks(p.truth, s->mask)->dice;
+    least = std::min(least, dice);
+    most = std::max(most, dice);
+  }
+  EXPECT_GT(least, 0.95);
+  EXPECT_LT(most - least, 0.03);
+}
+
+TEST(Segment, ChoosesTheSameForAScaledAndShiftedImage) {
+  const Phantom p = noisy_tree(6);
+  Image<float> other(p.image.grid);
+  for (std::size_t i = 0; i < other.voxels.size(); ++i)
+    other.voxels[i] = 4 * static_cast<float>(p.image.voxels[i]) + 64;
+  SegmentOptions o;
+  o.seeds_mm = {p.tree.branches.front().points_mm.col(8)};
+  Image<float> same(p.image.grid);
+  std::copy(p.image.voxels.begin(), p.image.voxels.end(), same.voxels.begin());
+  const auto a = segment(same, o), b = segment(other, o);
+  ASSERT_TRUE(a && b);
+  EXPECT_GT(compare_masks(a->mask, b->mask)->dice, 0.9999);  // but for rounding of grey values
+  EXPECT_NEAR(b->report.background, 4 * a->report.background + 64, 0.5);
+}
+
+TEST(Segment, DarkVesselsAreFoundToo) {
+  PhantomOptions o;
+  o.background = 1200;
+  o.vessel = 200;
+  o.snr = 8;
+  const auto p = make_phantom(PhantomKind::kBifurcation, o);
+  SegmentOptions s;
+  s.polarity = Polarity::kDark;
+  const auto found = segment(p->image, s);
+  ASSERT_TRUE(found.has_value()) << found.error().message();
+  EXPECT_GT(compare_masks(p->truth, found->mask)->dice, 0.96);
+}
+
+// ---- metrics ----------------------------------------------------------------------------------
+
+Mask box(const Vec3& spacing, int from, int to) {
+  ImageGrid grid;
+  grid.size = {30, 30, 30};
+  grid.spacing_mm = spacing;
+  Mask m(grid);
+  for (int z = 5; z < 15; ++z)
+    for (int y = 5; y < 15; ++y)
+      for (int x = from; x < to; ++x) m[{x, y, z}] = 1;
+  return m;
+}
+
+TEST(Metrics, AMaskIsLikeItself) {
+  const Mask m = box(Vec3(1, 2, 3), 5, 15);
+  const auto c = compare_masks(m, m);
+  ASSERT_TRUE(c.has_value());
+  EXPECT_EQ(c->dice, 1);
+  EXPECT_EQ(c->missed_percent, 0);
+  EXPECT_EQ(c->surface->mean_mm, 0);
+  EXPECT_EQ(c->surface->hausdorff_mm, 0);
+  EXPECT_EQ(c->truth_topology, c->result_topology);
+}
+
+TEST(Metrics, ALongerBoxIsOffByItsExtraLength) {
+  const auto c = compare_masks(box(Vec3(0.5, 1, 2), 5, 15), box(Vec3(0.5, 1, 2), 5, 19));
+  ASSERT_TRUE(c.has_value());
+  EXPECT_EQ(c->missed, 0U);
+  EXPECT_EQ(c->beyond, 400U);
+  EXPECT_DOUBLE_EQ(c->missed_percent, 40);
+  EXPECT_DOUBLE_EQ(c->dice, 2000.0 / 2400);
+  EXPECT_DOUBLE_EQ(c->surface->hausdorff_mm, 2.0);  // four voxels of half a millimetre
+}
+
+TEST(Metrics, EmptyMasksHaveStatedAnswers) {
+  const Mask full = box(Vec3::Ones(), 5, 15);
+  Mask none(full.grid);
+  EXPECT_EQ(compare_masks(none, none)->dice, 1);
+  EXPECT_EQ(compare_masks(full, none)->dice, 0);
+  EXPECT_FALSE(compare_masks(full, none)->surface.has_value());
+  EXPECT_EQ(compare_masks(full, none)->missed_percent, 100);
+}
+
+TEST(Metrics, RefusesMasksOnDifferentGrids) {
+  Mask other(box(Vec3::Ones(), 5, 15));
+  other.grid.spacing_mm[1] = 2;
+  EXPECT_FALSE(compare_masks(box(Vec3::Ones(), 5, 15), other).has_value());
+  other = Mask();
+  EXPECT_FALSE(compare_masks(box(Vec3::Ones(), 5, 15), other).has_value());
+}
+
+TEST(Metrics, CenterlineDiceIsTheHarmonicMeanOfBothShares) {
+  const Mask truth = box(Vec3::Ones(), 5, 15), result = box(Vec3::Ones(), 5, 25);
+  Mask truth_axis(truth.grid), result_axis(truth.grid);
+  for (int x = 5; x < 15; ++x) truth_axis[{x, 10, 10}] = 1;
+  for (int x = 5; x < 25; ++x) result_axis[{x, 10, 10}] = 1;
+  EXPECT_DOUBLE_EQ(centerline_dice(truth, truth_axis, result, result_axis), 2 * 0.5 / 1.5);
+  const Mask none(truth.grid);
+  EXPECT_EQ(centerline_dice(none, none, none, none), 1);
+}
+
+}  // namespace
+}  // namespace angiospline
