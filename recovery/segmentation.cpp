@@ -151,14 +151,13 @@ GrowOptions chosen(const AnyImage& image, const SegmentOptions& options, Segment
   grow.max_examined = options.max_examined;
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
   std::vector<SeedLevels> all;
-  if (!options.neighbourhood_vox || !options.deviations || !options.background)
-    for (const Vec3& seed : report.seeds_mm) {
-      const Voxel at = brightest_near(image, seed, 0, sign);
-      if (!grid_of(image).contains(at)) continue;  // grow_region says so
-      const auto levels =
-          levels_at(image, brightest_near(image, seed, grow.seed_search_vox, sign), sign);
-      if (levels) all.push_back(*levels);
-    }
+  for (const Vec3& seed : report.seeds_mm) {
+    const Voxel at = brightest_near(image, seed, 0, sign);
+    if (!grid_of(image).contains(at)) continue;  // grow_region says so
+    const auto levels =
+        levels_at(image, brightest_near(image, seed, grow.seed_search_vox, sign), sign);
+    if (levels) all.push_back(*levels);
+  }
   if (!all.empty()) {
     SeedLevels l = median_of(all);
     const double contrast = l.vessel - l.background;
@@ -168,10 +167,8 @@ GrowOptions chosen(const AnyImage& image, const SegmentOptions& options, Segment
     if (l.vessel_deviation > 0)
       grow.deviations = std::clamp(0.5 * contrast / l.vessel_deviation, 1.0, 2.0);
     const double floor = std::clamp(2 * l.background_deviation, 0.2 * contrast, 0.4 * contrast);
-    if (!options.background) {
-      grow.background = sign * (l.background + floor);
-      grow.background_level = sign * l.background;
-    }
+    if (!options.background) grow.background = sign * (l.background + floor);
+    grow.background_level = sign * l.background;
     l.vessel *= sign;
     l.background *= sign;
     report.levels = l;
@@ -184,10 +181,9 @@ GrowOptions chosen(const AnyImage& image, const SegmentOptions& options, Segment
     if (!options.deviations) report.choices.push_back(fmt::format("M = {:.3g}", grow.deviations));
     if (grow.background)
       report.choices.push_back(fmt::format("background threshold {:.4g}", *grow.background));
-  } else if (!options.neighbourhood_vox || !options.deviations || !options.background) {
-    report.warnings.push_back(fmt::format(
-        "no contrast was found around the seeds: N = {}, M = {:.3g}, no background threshold",
-        grow.neighbourhood_vox, grow.deviations));
+  } else {
+    report.warnings.push_back(
+        "no contrast was found around the seeds: the rule of growing is the plain one");
   }
   if (options.neighbourhood_vox) grow.neighbourhood_vox = *options.neighbourhood_vox;
   if (options.deviations) grow.deviations = *options.deviations;

@@ -63,7 +63,7 @@ struct Segmented {
 //   N          odd, 2 r + 1 voxels, 5 to 11
 //   M          2, or less: v - M sigma_v stays above the middle of v and b; at least 1
 //   background b + 2 sigma_b, within 0.2 to 0.4 of the way from b to v
-//   level      b is the `background_level` of GrowOptions, unless `background` is given
+//   level      b is the `background_level` of GrowOptions
 // Errors: those of grow_region; no seed given and nothing tubular found.
 Result<Segmented> segment(AnyImage image, const SegmentOptions& options = {},
                           const Progress& progress = {});
