@@ -28,14 +28,24 @@ struct CenterlineFileOptions {
 
   // The frame of the file's coordinates; unset: what the file says, else LPS.
   std::optional<CoordinateFrame> frame;
+
+  // VascuSynth only: the width of a voxel in the unit of the radii; unset: VascuSynth's default.
+  std::optional<double> voxel_width;
 };
 
-// The tree in a file; the suffix says the format: .swc; .csv .tsv .txt. Errors name file, line,
-// value and rule: missing, empty or truncated file, a value that is no finite number, a radius that
-// is not positive, a parent that does not exist, a cycle of parents, an id used twice, no positive
-// length. Time and memory O(size of the file).
+// The tree in a file; the suffix says the format: .swc .eswc; .csv .tsv .txt; .tree (the plain text
+// definition); .vtp .vtk; .gxl .xml (VascuSynth); .ctgr .pth (SimVascular); .graphml; vertices.csv
+// and edges.csv, either of which finds the other; a folder of such a pair or of one tree's
+// SimVascular files. Errors name file, line, value and rule: missing, empty or truncated file, a
+// value that is no finite number, a radius that is not positive, a parent that does not exist, a
+// cycle of parents, an id used twice, no positive length; or say which option decides what the file
+// leaves open. Memory O(size of the file), time O(n log n).
 Result<CenterlineTree> read_centerline_file(const std::filesystem::path& path,
                                             const CenterlineFileOptions& options = {});
+
+// One tree from several files: SimVascular's vessels. A single path is read as above.
+Result<CenterlineTree> read_centerline_files(const std::vector<std::filesystem::path>& paths,
+                                             const CenterlineFileOptions& options = {});
 
 // A unit of length in mm: "m", "cm", "mm", "um" (or "micrometre" ...), "inch", or a number of them
 // ("0.04mm"; a bare number is mm). Errors: anything else, or not positive.

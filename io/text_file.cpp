@@ -27,7 +27,7 @@ std::string_view unquoted(std::string_view field) {
 
 }  // namespace
 
-Result<std::string> read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {
+Result<std::string> read_bytes(const std::filesystem::path& path, std::size_t max_bytes) {
   const std::string name = path.string();
   std::error_code code;
   const auto status = std::filesystem::status(path, code);
@@ -51,9 +51,18 @@ Result<std::string> read_text_file(const std::filesystem::path& path, std::size_
     }
   }
   if (stream.bad()) return fail({ErrorKind::kBadInput, "cannot be read to its end", name, {}, {}});
-  const Result<std::string_view> plain = plain_text(text, name);
+  if (text.empty()) {
+    return fail({ErrorKind::kBadInput, "is empty", name, {}, "there must be at least one point"});
+  }
+  return text;
+}
+
+Result<std::string> read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {
+  Result<std::string> text = read_bytes(path, max_bytes);
+  if (!text) return text;
+  const Result<std::string_view> plain = plain_text(*text, path.string());
   if (!plain) return fail(plain.error());
-  if (plain->size() < text.size()) text.erase(0, text.size() - plain->size());
+  if (plain->size() < text->size()) text->erase(0, text->size() - plain->size());
   return text;
 }
 
@@ -92,6 +101,13 @@ std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kSpaces);
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(kSpaces) - first + 1);
+}
+
+std::string_view trimmed_lines(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\v\f\r\n";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
 std::string lower_case(std::string_view text) {

@@ -21,6 +21,10 @@ inline constexpr std::size_t kMaxTextFileBytes = std::size_t{1} << 30;
 Result<std::string> read_text_file(const std::filesystem::path& path,
                                    std::size_t max_bytes = kMaxTextFileBytes);
 
+// The bytes of a file as they are. Errors: missing, a folder, unreadable, empty, too large.
+Result<std::string> read_bytes(const std::filesystem::path& path,
+                               std::size_t max_bytes = kMaxTextFileBytes);
+
 // The checks of read_text_file for text already in memory: empty, UTF-16, zero bytes; drops the
 // BOM.
 Result<std::string_view> plain_text(std::string_view text, std::string_view name);
@@ -39,8 +43,9 @@ class LineReader {
   int line_ = 0;
 };
 
-std::string_view trimmed(std::string_view text);
-std::string lower_case(std::string_view text);  // ASCII only
+std::string_view trimmed(std::string_view text);        // of spaces and tabs
+std::string_view trimmed_lines(std::string_view text);  // of line ends too
+std::string lower_case(std::string_view text);          // ASCII only
 
 // Splits at runs of spaces and tabs (`separator` = ' ') or at every `separator`, trimming each
 // field and one pair of double quotes. `fields` is cleared first: a buffer kept by the caller's

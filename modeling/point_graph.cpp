@@ -74,6 +74,7 @@ struct Edge {
   int a, b;              // groups
   int point_a, point_b;  // members
   int line;              // or -1
+  double radius_mm;      // or 0
 };
 
 class TreeBuilder {
@@ -225,7 +226,8 @@ class TreeBuilder {
     for (const int e : kept) {
       const auto& [a, b] = graph_.edges[index(e)];
       const int line = graph_.line_of_edge.empty() ? -1 : graph_.line_of_edge[index(e)];
-      edges_.push_back({groups_.of(a), groups_.of(b), a, b, line});
+      const double radius = graph_.edge_radii_mm.empty() ? 0.0 : graph_.edge_radii_mm[index(e)];
+      edges_.push_back({groups_.of(a), groups_.of(b), a, b, line, radius});
     }
   }
 
@@ -268,7 +270,8 @@ class TreeBuilder {
 
   void trace(int start, int e, const Incidence& at, std::vector<bool>& done) {
     if (done[index(e)]) return;
-    std::vector<int> members;  // the points whose radii the branch bears
+    std::vector<int> members;   // the points whose radii the branch bears
+    std::vector<double> radii;  // of the edges between them
     int here = start;
     int forward = 0;
     int line = edges_[index(e)].line;
@@ -276,6 +279,7 @@ class TreeBuilder {
       done[index(e)] = true;
       const Edge& edge = edges_[index(e)];
       if (edge.line != line) line = -1;
+      radii.push_back(edge.radius_mm);
       const bool along = edge.a == here;
       forward += along ? 1 : -1;
       if (members.empty()) members.push_back(along ? edge.point_a : edge.point_b);
@@ -285,7 +289,10 @@ class TreeBuilder {
       const int* next = at.begin(here);
       e = done[index(next[0])] ? next[1] : next[0];
     }
-    if (forward < 0) std::reverse(members.begin(), members.end());
+    if (forward < 0) {
+      std::reverse(members.begin(), members.end());
+      std::reverse(radii.begin(), radii.end());
+    }
     CenterlineBranch branch;
     branch.from = node_of_[index(groups_.of(members.front()))];
     branch.to = node_of_[index(groups_.of(members.back()))];
@@ -293,7 +300,10 @@ class TreeBuilder {
     branch.radii_mm.resize(static_cast<Eigen::Index>(members.size()));
     for (std::size_t i = 0; i < members.size(); ++i) {
       branch.points_mm.col(static_cast<Eigen::Index>(i)) = position(members[i]);
-      branch.radii_mm(static_cast<Eigen::Index>(i)) = graph_.points[index(members[i])].radius_mm;
+      const double of_edges =
+          0.5 * (radii[i > 0 ? i - 1 : 0] + radii[std::min(i, radii.size() - 1)]);
+      branch.radii_mm(static_cast<Eigen::Index>(i)) =
+          of_edges > 0 ? of_edges : graph_.points[index(members[i])].radius_mm;
     }
     second_.push_back(members.size() > 2 ? std::pair{members[1], members[members.size() - 2]}
                                          : std::pair{-1, -1});

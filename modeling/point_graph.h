@@ -21,6 +21,10 @@ struct PointGraph {
   std::vector<std::pair<int, int>> edges;  // in the direction of the flow where that is known
   std::vector<int> roots;                  // where flow enters, if the input says so
 
+  // Radii of the edges, where the input has them instead of the points': empty, or one for each
+  // edge. A point between two edges of a branch gets their mean.
+  std::vector<double> edge_radii_mm;
+
   // The input's own names of lines: empty, or for each edge the index of its name in `line_names`.
   std::vector<int> line_of_edge;
   std::vector<std::string> line_names;
