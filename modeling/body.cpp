@@ -3,34 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
-#include <numeric>
+#include <limits>
 
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
 #include "kernel/basis.h"
+#include "modeling/body_seams.h"
 #include "modeling/spline_fit.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
 // ---------------------------------------------------------------- frames along the path
-
-struct Station {
-  Vec3 center;
-  Vec3 e1, e2;  // e1 x e2 = tangent
-  double radius;
-
-  // The body's own plane coordinates: angles grow clockwise about the tangent.
-  Vec2 local(const Vec3& p) const {
-    return Vec2((p - center).dot(e1), -(p - center).dot(e2)) / radius;
-  }
-  Vec3 world(const Vec2& q) const { return center + radius * (q.x() * e1 - q.y() * e2); }
-};
 
 Vec3 any_orthogonal(const Vec3& t) {
   Eigen::Index axis = 0;
@@ -71,127 +56,6 @@ std::vector<Station> stations_along(const BSplineCurve<4>& path, const BodyEnd& 
   return stations;
 }
 
-// ---------------------------------------------------------------- strips and their shapes
-
-// Seam points as fractions of a turn, a common refinement of the arcs of both ends; `shift` arcs of
-// the end are passed before its first strip.
-std::vector<BodyStrip> make_strips(int start_arcs, int end_arcs, int start_shift, int end_shift) {
-  const int both = std::lcm(start_arcs, end_arcs);
-  std::vector<int> breaks;
-  for (int i = 0; i <= start_arcs; ++i) breaks.push_back(i * (both / start_arcs));
-  for (int i = 0; i <= end_arcs; ++i) breaks.push_back(i * (both / end_arcs));
-  std::sort(breaks.begin(), breaks.end());
-  breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
-  const auto part = [&](int from, int to, int arcs, int shift) {
-    const int width = both / arcs;
-    const int arc = from / width;
-    return ArcPart{(arc + shift) % arcs, static_cast<double>(from - arc * width) / width,
-                   static_cast<double>(to - arc * width) / width};
-  };
-  std::vector<BodyStrip> strips;
-  for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
-    strips.push_back({part(breaks[k], breaks[k + 1], start_arcs, start_shift),
-                      part(breaks[k], breaks[k + 1], end_arcs, end_shift)});
-  }
-  return strips;
-}
-
-// One end of one strip in its plane: what is blended between the ends.
-struct StripShape {
-  double share = 0;                        // of the turn: the strip's width in the common parameter
-  double seam_angle = 0, seam_radius = 1;  // of the first point
-  Vec2 seam_speed = Vec2::Zero();          // radial, tangential derivative in the common parameter
-  std::array<double, 2> angle{}, radius{};  // of the two middle control points
-};
-
-using RingShape = std::vector<StripShape>;
-
-double angle_of(const Vec2& p) { return std::atan2(p.y(), p.x()); }
-
-// The angle nearest to `near`.
-double unwrapped(double angle, double near) {
-  return angle + 2 * kPi * std::round((near - angle) / (2 * kPi));
-}
-
-RingShape ring_shape(const std::vector<BodyStrip>& strips, const BodyEnd& end,
-                     const Station& station, bool at_start) {
-  RingShape shape;
-  double angle = 0;
-  for (const BodyStrip& strip : strips) {
-    const ArcPart& part = at_start ? strip.start : strip.end;
-    const Arc arc = end.arcs[index(part.arc)] * arc_part_weights(part.from, part.to).transpose();
-    std::array<Vec2, 6> p;
-    for (int j = 0; j < 6; ++j) p[index(j)] = station.local(arc.col(j));
-    StripShape s;
-    s.share = (part.to - part.from) / static_cast<double>(end.arcs.size());
-    // Angles grow along the ring; a strip is less than a whole turn.
-    double raw = unwrapped(angle_of(p[0]), angle);
-    if (!shape.empty() && raw < angle) raw += 2 * kPi;
-    s.seam_angle = shape.empty() ? angle_of(p[0]) : raw;
-    s.seam_radius = p[0].norm();
-    const Vec2 radial = p[0] / s.seam_radius;
-    const Vec2 speed = 5 * (p[1] - p[0]) / s.share;
-    s.seam_speed = Vec2(radial.dot(speed), -radial.y() * speed.x() + radial.x() * speed.y());
-    angle = s.seam_angle;
-    for (int j = 0; j < 2; ++j) {
-      double a = unwrapped(angle_of(p[index(2 + j)]), angle);
-      if (a < angle) a += 2 * kPi;
-      s.angle[index(j)] = angle = a;
-      s.radius[index(j)] = p[index(2 + j)].norm();
-    }
-    shape.push_back(s);
-  }
-  return shape;
-}
-
-// Adds one angle to the whole ring.
-void turn(RingShape& shape, double angle) {
-  for (StripShape& s : shape) {
-    s.seam_angle += angle;
-    for (double& a : s.angle) a += angle;
-  }
-}
-
-// Largest seam turn between two rings after removing whole turns.
-double match_turns(const RingShape& start, RingShape& end) {
-  double mean = 0;
-  for (std::size_t k = 0; k < start.size(); ++k) mean += end[k].seam_angle - start[k].seam_angle;
-  mean /= static_cast<double>(start.size());
-  turn(end, -2 * kPi * std::round(mean / (2 * kPi)));
-  double largest = 0;
-  for (std::size_t k = 0; k < start.size(); ++k) {
-    largest = std::max(largest, std::abs(end[k].seam_angle - start[k].seam_angle));
-  }
-  return largest;
-}
-
-double mix(double a, double b, double w) { return (1 - w) * a + w * b; }
-
-// The ring's control points between two shapes. Across a seam both neighbours take their tangents
-// from one vector, times their own shares: the ratio is the same everywhere along the body.
-std::vector<Vec2> blend(const RingShape& a, const RingShape& b, double w) {
-  const std::size_t n = a.size();
-  std::vector<Vec2> ring(5 * n);
-  for (std::size_t k = 0; k < n; ++k) {
-    const StripShape& p = a[k];
-    const StripShape& q = b[k];
-    const double angle = mix(p.seam_angle, q.seam_angle, w);
-    const Vec2 radial(std::cos(angle), std::sin(angle));
-    const Vec2 seam = mix(p.seam_radius, q.seam_radius, w) * radial;
-    const Vec2 speed = mix(p.seam_speed.x(), q.seam_speed.x(), w) * radial +
-                       mix(p.seam_speed.y(), q.seam_speed.y(), w) * Vec2(-radial.y(), radial.x());
-    ring[5 * k] = seam;
-    ring[5 * k + 1] = seam + p.share / 5 * speed;
-    ring[(5 * k + 5 * n - 1) % (5 * n)] = seam - a[(k + n - 1) % n].share / 5 * speed;
-    for (std::size_t j = 0; j < 2; ++j) {
-      const double middle = mix(p.angle[j], q.angle[j], w);
-      ring[5 * k + 2 + j] =
-          mix(p.radius[j], q.radius[j], w) * Vec2(std::cos(middle), std::sin(middle));
-    }
-  }
-  return ring;
-}
-
 // 0 to 1 with two vanishing derivatives at both ends.
 double smooth_step(double t) { return t * t * t * (10 + t * (6 * t - 15)); }
 
@@ -211,7 +75,7 @@ Sweep sweep_rings(const std::vector<Station>& stations, const RingShape& start,
   for (Eigen::Index i = 0; i < count; ++i) {
     const double t = static_cast<double>(i) / static_cast<double>(count - 1);
     const Station& station = stations[static_cast<std::size_t>(i)];
-    const std::vector<Vec2> ring = blend(start, end, smooth_step(t));
+    const std::vector<Vec2> ring = blend_rings(start, end, smooth_step(t));
     for (std::size_t c = 0; c < ring.size(); ++c) {
       sweep.values.row(i).segment<3>(static_cast<Eigen::Index>(3 * c)) = station.world(ring[c]);
     }
@@ -221,18 +85,9 @@ Sweep sweep_rings(const std::vector<Station>& stations, const RingShape& start,
   return sweep;
 }
 
-// Ring of an end, exactly on its arcs.
-Eigen::RowVectorXd end_row(const std::vector<BodyStrip>& strips, const BodyEnd& end,
-                           bool at_start) {
-  Eigen::RowVectorXd row(static_cast<Eigen::Index>(15 * strips.size()));
-  for (std::size_t k = 0; k < strips.size(); ++k) {
-    const ArcPart& part = at_start ? strips[k].start : strips[k].end;
-    const Arc arc = end.arcs[index(part.arc)] * arc_part_weights(part.from, part.to).transpose();
-    for (int j = 0; j < 5; ++j) {
-      row.segment<3>(static_cast<Eigen::Index>(15 * k) + 3 * j) = arc.col(j);
-    }
-  }
-  return row;
+// The ring as one row of the fit.
+Eigen::RowVectorXd as_row(const Points3& ring) {
+  return Eigen::Map<const Eigen::RowVectorXd>(ring.data(), ring.size());
 }
 
 // How a joined end's row moves on along the path: affine in the point, parallel to the tangent.
@@ -301,7 +156,8 @@ std::vector<double> bisected(const std::vector<double>& breaks, const std::vecto
 }
 
 // Least (Su x Sv) . outward over its mean, on a grid of every strip.
-double jacobian_ratio(const Body& body, const BSplineCurve<4>& path) {
+template <typename Center>
+double jacobian_ratio(const Body& body, const Center& center_at) {
   const int steps = 4;
   const KnotVector bezier = KnotVector::bezier(5);
   const std::vector<double> breaks = body.u.breakpoints();
@@ -321,7 +177,7 @@ double jacobian_ratio(const Body& body, const BSplineCurve<4>& path) {
       }
       row.rightCols<1>() = row.col(0);
       row_u.rightCols<1>() = row_u.col(0);
-      const Vec3 center = path.at(u).head<3>();
+      const Vec3 center = center_at(u);
       for (std::size_t k = 0; k < body.strips.size(); ++k) {
         for (const double v : {0.0, 0.25, 0.5, 0.75}) {
           const BasisValues bv = basis_at(bezier, v, 1);
@@ -338,32 +194,6 @@ double jacobian_ratio(const Body& body, const BSplineCurve<4>& path) {
     }
   }
   return sum > 0 ? least / (sum / count) : -1.0;
-}
-
-struct Matching {
-  std::vector<BodyStrip> strips;
-  RingShape start, end;
-  double twist_rad;
-};
-
-// The pair of seams that, laid on each other, turn least along the body.
-Matching match_seams(const BodyEnd& start, const BodyEnd& end, const Station& first,
-                     const Station& last) {
-  const int a = static_cast<int>(start.arcs.size());
-  const int b = static_cast<int>(end.arcs.size());
-  Matching best;
-  best.twist_rad = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < a; ++i) {
-    for (int j = 0; j < b; ++j) {
-      Matching trial;
-      trial.strips = make_strips(a, b, i, j);
-      trial.start = ring_shape(trial.strips, start, first, true);
-      trial.end = ring_shape(trial.strips, end, last, false);
-      trial.twist_rad = match_turns(trial.start, trial.end);
-      if (trial.twist_rad < best.twist_rad - 1e-9) best = std::move(trial);
-    }
-  }
-  return best;
 }
 
 // The arcs of one station, moved to another.
@@ -392,28 +222,12 @@ std::vector<Arc> two_arc_circle(const Vec3& center, double radius, const Vec3& t
   const std::array<double, 6> along{1, 1, kC, -kC, -1, -1};
   const std::array<double, 6> side{0, kA, kB, kB, kA, 0};
   for (int j = 0; j < 6; ++j) {
-    const Vec3 offset = radius * (along[index(j)] * seam + side[index(j)] * across);
+    const Vec3 offset = radius * (along[static_cast<std::size_t>(j)] * seam +
+                                  side[static_cast<std::size_t>(j)] * across);
     arcs[0].col(j) = center + offset;
     arcs[1].col(j) = center - offset;
   }
   return arcs;
-}
-
-Eigen::Matrix<double, 6, 6> arc_part_weights(double from, double to) {
-  // Row i: the blossom with 5 - i arguments `from` and i arguments `to`, by de Casteljau on the
-  // unit vectors of the control points.
-  Eigen::Matrix<double, 6, 6> weights;
-  for (int i = 0; i < 6; ++i) {
-    Eigen::Matrix<double, 6, 6> points = Eigen::Matrix<double, 6, 6>::Identity();  // row: a point
-    for (int level = 0; level < 5; ++level) {
-      const double t = level < 5 - i ? from : to;
-      for (int j = 0; j < 5 - level; ++j) {
-        points.row(j) = (1 - t) * points.row(j) + t * points.row(j + 1);
-      }
-    }
-    weights.row(i) = points.row(0);
-  }
-  return weights;
 }
 
 Body make_body(const BodyPath& path, BodyEnd start, BodyEnd end, const BodyOptions& options) {
@@ -431,7 +245,7 @@ Body make_body(const BodyPath& path, BodyEnd start, BodyEnd end, const BodyOptio
   if (start.arcs.empty()) start.arcs = carried_arcs(end.arcs, last, first);
   if (end.arcs.empty()) end.arcs = carried_arcs(start.arcs, first, last);
 
-  const Matching match = match_seams(start, end, first, last);
+  const SeamMatching match = match_seams(start, end, first, last);
   const Sweep sweep = sweep_rings(stations, match.start, match.end);
   Body body;
   body.strips = match.strips;
@@ -440,8 +254,8 @@ Body make_body(const BodyPath& path, BodyEnd start, BodyEnd end, const BodyOptio
   SplineFitProblem problem;
   problem.parameters = sweep.parameters;
   problem.values = sweep.values;
-  const Eigen::RowVectorXd first_row = end_row(match.strips, start, true);
-  const Eigen::RowVectorXd last_row = end_row(match.strips, end, false);
+  const Eigen::RowVectorXd first_row = as_row(ring_on_arcs(match.strips, start, true));
+  const Eigen::RowVectorXd last_row = as_row(ring_on_arcs(match.strips, end, false));
   const Departure leaving = departure_at(path.curve, 0.0, start);
   const Departure arriving = departure_at(path.curve, 1.0, end);
   std::vector<double> breaks{0.0, 1.0};
@@ -466,7 +280,43 @@ Body make_body(const BodyPath& path, BodyEnd start, BodyEnd end, const BodyOptio
       body.net.col(i * body.ring() + c) = control.row(i).segment<3>(3 * c).transpose();
     }
   }
-  body.jacobian_ratio = jacobian_ratio(body, path.curve);
+  body.jacobian_ratio =
+      jacobian_ratio(body, [&](double u) { return Vec3(path.curve.at(u).head<3>()); });
+  return body;
+}
+
+Body make_lofted_body(const BodyEnd& start, const BodyEnd& end) {
+  EXPECTS(!start.arcs.empty() && !end.arcs.empty());
+  // The end's frame is the start's, turned as little as takes one tangent to the other.
+  const Vec3 e = any_orthogonal(start.tangent);
+  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(start.tangent, end.tangent);
+  const Vec3 f = turn * e;
+  const Station first{start.center_mm, e, start.tangent.cross(e), start.radius_mm};
+  const Station last{end.center_mm, f, end.tangent.cross(f), end.radius_mm};
+  const SeamMatching match = match_seams(start, end, first, last);
+  const Points3 a = ring_on_arcs(match.strips, start, true);
+  const Points3 d = ring_on_arcs(match.strips, end, false);
+
+  // Each point leaves along its end's tangent by a third of its way to the other end's plane, which
+  // is an affine function of the point.
+  Points3 b = a;
+  Points3 c = d;
+  const double facing = start.tangent.dot(end.tangent);
+  for (Eigen::Index k = 0; k < a.cols(); ++k) {
+    const double forward = (end.center_mm - a.col(k)).dot(end.tangent) / facing;
+    const double backward = (d.col(k) - start.center_mm).dot(start.tangent) / facing;
+    b.col(k) += forward / 3 * start.tangent;
+    c.col(k) -= backward / 3 * end.tangent;
+  }
+  Body body;
+  body.strips = match.strips;
+  body.twist_rad = match.twist_rad;
+  const int ring = body.ring();
+  body.net.resize(3, 6 * static_cast<Eigen::Index>(ring));
+  body.net << a, (2 * a + 3 * b) / 5, (a + 6 * b + 3 * c) / 10, (3 * b + 6 * c + d) / 10,
+      (3 * c + 2 * d) / 5, d;
+  body.jacobian_ratio = jacobian_ratio(
+      body, [&](double u) { return Vec3((1 - u) * start.center_mm + u * end.center_mm); });
   return body;
 }
 

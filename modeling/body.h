@@ -80,6 +80,12 @@ struct BodyOptions {
 // Minimizing Frames, ACM TOG 2008 (the double reflection).
 Body make_body(const BodyPath& path, BodyEnd start, BodyEnd end, const BodyOptions& options = {});
 
+// The short cut for ends too near each other for a sweep: one span, each point of one circle led to
+// its partner on the other by a cubic that leaves along the tangents. Keeps the laws of Body; its
+// cross-sections are circles only at the ends. Requires arcs at both ends, and tangents less than a
+// right angle apart.
+Body make_lofted_body(const BodyEnd& start, const BodyEnd& end);
+
 // Weights (row: new control point, column: old one) of the part [from, to] of a quintic Bezier arc.
 Eigen::Matrix<double, 6, 6> arc_part_weights(double from, double to);
 

@@ -1,7 +1,9 @@
 #include "modeling/seed_model.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <optional>
 
 #include <Eigen/Geometry>
@@ -17,7 +19,9 @@
 namespace angiospline {
 namespace {
 
-constexpr int kJunctionRounds = 4;      // of building, merging what failed and building again
+constexpr int kJunctionRounds = 6;  // of building, changing the plan of what failed, building again
+constexpr std::array<double, 3> kForwardRadii{1.0, 2.0, 4.0};  // of the first rounds, each on top
+constexpr double kReachFarther = 1.6;   // times the distance at which directions are taken
 constexpr double kMergeReach = 6.0;     // radii of branch between junctions that may be merged
 constexpr double kFoldedBody = 0.02;    // Jacobian ratio of a body that counts as folded
 constexpr double kShortestPiece = 0.1;  // length of a body that is worth having, in radii
@@ -45,15 +49,13 @@ bool same(const JunctionSpec& a, const JunctionSpec& b) {
   return true;
 }
 
-// The junction with the options asked for; if that fails, with wider openings and with a narrower
-// or wider blend.
+// The junction with the options asked for; if that fails, with openings farther out.
 BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& options) {
   BuiltJunction built{node.spec, {}, node.error};
   if (node.error) return built;
-  for (const auto& [margin, blend] : {std::pair{1.0, 1.0}, {1.6, 1.0}, {1.0, 0.67}, {0.6, 1.5}}) {
+  for (const double margin : {1.0, 1.6}) {
     JunctionOptions tried = options;
     tried.margin *= margin;
-    tried.blend *= blend;
     Result<Junction> junction = make_junction(node.spec, tried);
     if (junction) {
       built.junction = std::move(*junction);
@@ -117,15 +119,20 @@ class Seeder {
     return true;
   }
 
-  // First directions taken farther out, then merging with the nearest neighbour.
+  // What fails mostly has all its branches on one side, where they part only slowly: its centre is
+  // moved forward to where they do; then it is merged with its nearest neighbour; then directions
+  // are taken farther out.
   bool change_failed(int round) {
     bool changed = false;
     for (int n = 0; n < static_cast<int>(built_.size()); ++n) {
       if (!plan_.nodes()[index(n)].is_junction() || built_[index(n)].junction) continue;
-      if (round == 0) {
-        plan_.reach_farther(n, 1.6);
+      if (index(round) < kForwardRadii.size()) {
+        plan_.move_forward(n, kForwardRadii[index(round)]);
         changed = true;
       } else if (plan_.merge_with_nearest(n, kMergeReach)) {
+        changed = true;
+      } else {
+        plan_.reach_farther(n, kReachFarther);
         changed = true;
       }
     }
@@ -211,6 +218,7 @@ class Seeder {
       distance =
           (junctions_[index(number_[index(n)])].openings[slot].center_mm - node.center_mm).norm();
     }
+    if (!node.meets_mm.empty()) distance = std::max(distance, node.meets_mm[slot]);
     const double from_node = branch.along_at_distance({b, at_end}, node.center_mm, distance)
                                  .value_or(branch.length_mm());
     stop.along = at_end ? branch.length_mm() - from_node : from_node;
@@ -258,6 +266,11 @@ class Seeder {
       return outcome;
     }
     BodyPiece piece = sweep(followed(branch, start, end), start, end);
+    if (piece.body.jacobian_ratio < kFoldedBody && !capped) {
+      // The ends are too near each other for a tube that bends: they are joined directly.
+      Body loft = make_lofted_body(start.body, end.body);
+      if (loft.jacobian_ratio > piece.body.jacobian_ratio) piece.body = std::move(loft);
+    }
     if (piece.body.jacobian_ratio < kFoldedBody) {
       // The path is too crooked for its radius: between its ends it goes the shortest way.
       BodyPiece direct = sweep(straight(start, end), start, end);

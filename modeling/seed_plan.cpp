@@ -2,25 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "base/contract.h"
+#include "modeling/body_path.h"
 
 namespace angiospline {
 namespace {
 
 constexpr double kSamplesPerRadius = 6;
-constexpr double kLeastMargin = 0.35;  // of an opening beyond the blend, in radii
+constexpr double kLeastMargin = 0.3;  // of an opening beyond the blend, in radii
+constexpr double kLeastBlend = 0.4;   // of the blend asked for
+constexpr double kMergedOffset =
+    0.2;  // branches that begin this far from their node were moved to it
+constexpr double kPartingRadii = 0.5;  // from where they began to where they are aimed at, at first
 constexpr double kLeastBody = 0.4;     // length of a body, in radii
-constexpr double kBendingRoom = 3.0;   // a body shorter than this, in radii, had better be straight
-constexpr double kStraightEnough = 0.7;  // chord over arc of a branch that may be taken straight
+constexpr double kLeastStraight = 0.15;  // and of one that is straight
+constexpr double kRounding = 1e-9;
+constexpr double kWorthTightening = 0.05;  // radii by which an opening must come nearer
+constexpr double kStraightEnough = 0.7;    // chord over arc of a branch that may be taken straight
 constexpr int kDirectionRounds = 8;
 constexpr int kPlanRounds = 64;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+double least_body(const PlannedBranch& branch) {
+  return branch.straight ? kLeastStraight : kLeastBody;
+}
 
 PlannedBranch sample_branch(const SmoothedTree& tree, int b) {
   const CenterlineBranch& source = tree.tree.branches[index(b)];
@@ -131,6 +143,7 @@ SeedPlan::SeedPlan(const SmoothedTree& tree, const JunctionOptions& options) : o
 void SeedPlan::detach(BranchEnd end) {
   PlannedNode& node = node_at(end);
   node.ends.erase(node.ends.begin() + slot_of(end));
+  node.caps_mm.clear();
   node.alive = !node.ends.empty();
 }
 
@@ -219,7 +232,9 @@ void SeedPlan::merge(int b, const std::string& why) {
     return std::pair(x.branch, x.at_end) < std::pair(y.branch, y.at_end);
   });
   a.reach = 1.0;
+  a.caps_mm.clear();
   dirty_[index(kept)] = 1;
+  for (const BranchEnd& end : a.ends) branches_[index(end.branch)].tried_straight = false;
   join_through(kept);
 }
 
@@ -249,25 +264,32 @@ void SeedPlan::extend(int b, double missing) {
 // ---------------------------------------------------------------- measuring junctions
 
 // Directions are those from the centre to the openings' centres on the paths, whose distances
-// depend on the directions: a fixed point, found by repetition (damped after a few rounds).
+// depend on the directions: a fixed point, found by repetition from the nearest possible openings
+// outward (damped after a few rounds).
 void SeedPlan::measure(PlannedNode& node) const {
   const std::size_t n = node.ends.size();
   std::vector<double> distance(n);
   node.spec.center_mm = node.center_mm;
   node.spec.branches.assign(n, {});
+  node.meets_mm.assign(n, 0.0);
+  node.caps_mm.resize(n, std::numeric_limits<double>::infinity());
   node.error.reset();
-  double widest = 0;
-  for (const BranchEnd& end : node.ends) {
+  for (std::size_t k = 0; k < n; ++k) {
+    const BranchEnd end = node.ends[k];
     const PlannedBranch& branch = branches_[index(end.branch)];
-    widest = std::max(widest, branch.at(end.at_end ? branch.length_mm() : 0.0)(3));
+    const Vec4 first = branch.at(end.at_end ? branch.length_mm() : 0.0);
+    distance[k] = first(3);
+    // Branches of a merged node may begin away from its centre: they part beyond where they begin.
+    const double away = (first.head<3>() - node.center_mm).norm();
+    if (away > kMergedOffset * first(3)) node.meets_mm[k] = away + kPartingRadii * first(3);
   }
-  distance.assign(n, 2 * widest);
   const auto aim = [&] {
     for (std::size_t k = 0; k < n; ++k) {
       const BranchEnd end = node.ends[k];
       const PlannedBranch& branch = branches_[index(end.branch)];
-      const auto along = branch.along_at_distance(end, node.center_mm, node.reach * distance[k]);
-      const double s = along.value_or(branch.length_mm());
+      const double meets = std::max(node.meets_mm[k], node.reach * distance[k]);
+      const double s =
+          branch.along_at_distance(end, node.center_mm, meets).value_or(branch.length_mm());
       Vec4 target = branch.at(end.at_end ? branch.length_mm() - s : s);
       const double radius = target(3);
       if (branch.straight) target.head<3>() = node_at({end.branch, !end.at_end}).center_mm;
@@ -282,12 +304,16 @@ void SeedPlan::measure(PlannedNode& node) const {
       // Branches that leave together part farther out.
       node.error = next.error();
       for (double& d : distance) d *= 1.5;
+      for (std::size_t k = 0; k < n; ++k) {
+        if (node.meets_mm[k] > 0) node.meets_mm[k] += 0.5 * node.spec.branches[k].radius_mm;
+      }
       continue;
     }
     node.error.reset();
     double change = 0;
     for (std::size_t k = 0; k < n; ++k) {
-      const double to = round < 3 ? (*next)[k] : ((*next)[k] + distance[k]) / 2;
+      const double capped = std::min((*next)[k], node.caps_mm[k]);
+      const double to = round < 3 ? capped : (capped + distance[k]) / 2;
       change = std::max(change, std::abs(to - distance[k]) / node.spec.branches[k].radius_mm);
       distance[k] = to;
     }
@@ -297,14 +323,23 @@ void SeedPlan::measure(PlannedNode& node) const {
   aim();
   JunctionOptions tight = options_;
   tight.margin = std::min(kLeastMargin, options_.margin);
+  tight.blend = kLeastBlend * options_.blend;
   const auto wanted = opening_distances_mm(node.spec, options_);
   const auto least = opening_distances_mm(node.spec, tight);
   if (!wanted || !least) {
     node.error = wanted ? least.error() : wanted.error();
     return;
   }
-  node.wanted_mm = *wanted;
   node.least_mm = *least;
+  node.wanted_mm = *wanted;
+  for (std::size_t k = 0; k < n; ++k) {
+    node.wanted_mm[k] = std::max(node.least_mm[k], std::min(node.wanted_mm[k], node.caps_mm[k]));
+  }
+  if (node.reach > 1) {
+    for (std::size_t k = 0; k < n; ++k) {
+      node.meets_mm[k] = std::max(node.meets_mm[k], node.reach * distance[k]);
+    }
+  }
 }
 
 // ---------------------------------------------------------------- room along branches
@@ -324,7 +359,7 @@ double SeedPlan::end_along(int b, bool at_end, bool wanted) const {
   const PlannedNode& node = node_at(end);
   if (!node.is_junction() || node.error) return 0.0;
   const auto k = index(slot_of(end));
-  const double distance = wanted ? node.wanted_mm[k] : node.least_mm[k];
+  const double distance = std::max(wanted ? node.wanted_mm[k] : node.least_mm[k], node.meets_mm[k]);
   const PlannedBranch& branch = branches_[index(b)];
   if (branch.straight) return distance;
   // Beyond the end of the path every millimetre counts as one.
@@ -351,9 +386,79 @@ SeedPlan::Room SeedPlan::room_of(int b) const {
                        ? node.spec.branches[index(slot_of(end))].radius_mm / 2
                        : branch.at(at_end ? branch.length_mm() : 0.0)(3) / 2;
   }
-  room.least += kLeastBody * room.radius;
-  room.wanted += kLeastBody * room.radius;
+  const double body = least_body(branch) * room.radius;
+  room.least += body;
+  room.wanted += body;
   return room;
+}
+
+// Where an opening is planned: at its wanted distance along its direction.
+double SeedPlan::planned_mm(BranchEnd end) const {
+  return node_at(end).wanted_mm[index(slot_of(end))];
+}
+
+// Curvature times radius that a body between two openings needs at least: that of the cubic between
+// them with their axes as tangents. 0 where an end is not an opening.
+double SeedPlan::bend_of(int b) const {
+  Vec3 place[2];
+  Vec3 along[2];
+  double radius = 0;
+  for (const bool at_end : {false, true}) {
+    const BranchEnd end{b, at_end};
+    const PlannedNode& node = node_at(end);
+    if (!node.is_junction() || node.error) return 0.0;
+    const JunctionBranch& opening = node.spec.branches[index(slot_of(end))];
+    place[at_end] = node.center_mm + planned_mm(end) * opening.direction;
+    along[at_end] = at_end ? Vec3(-opening.direction) : opening.direction;
+    radius = std::max(radius, opening.radius_mm);
+  }
+  const double length = (place[1] - place[0]).norm();
+  const Vec3 chord = (place[1] - place[0]) / length;
+  // Slopes against the chord; steep ones count as steeper still.
+  const auto slope = [&](const Vec3& t) {
+    const double forward = std::max(t.dot(chord), 0.1);
+    return Vec3((t - t.dot(chord) * chord) / forward);
+  };
+  const Vec3 a = slope(along[0]);
+  const Vec3 c = slope(along[1]);
+  return std::max((4 * a + 2 * c).norm(), (2 * a + 4 * c).norm()) * radius / length;
+}
+
+// A branch without room for a body, or whose body would bend too tightly, is taken straight; if
+// that gives no room either, it is taken as it was. True if the branch changed.
+bool SeedPlan::straighten(int b, const Room& room, double bend) {
+  PlannedBranch& branch = branches_[index(b)];
+  const PlannedNode& from = nodes_[index(branch.from)];
+  const PlannedNode& to = nodes_[index(branch.to)];
+  if (!from.is_junction() || !to.is_junction() || branch.from == branch.to) return false;
+  const bool fits = room.length >= room.least * (1 - kRounding);
+  if (branch.straight) {
+    if (fits || branch.tried_straight) return false;
+    branch.straight = false;
+    branch.tried_straight = true;
+    return true;
+  }
+  const double chord = (to.center_mm - from.center_mm).norm();
+  if (branch.tried_straight || chord < kStraightEnough * branch.length_mm()) return false;
+  if (fits && bend <= kTightestBend) return false;
+  branch.straight = true;
+  return true;
+}
+
+// What is done about a branch whose openings do not fit on it.
+void SeedPlan::make_room(int b, const Room& room) {
+  const PlannedBranch& branch = branches_[index(b)];
+  const bool from = nodes_[index(branch.from)].is_junction();
+  const bool to = nodes_[index(branch.to)].is_junction();
+  if (from && to && branch.from == branch.to) {
+    drop(b, "a loop that lies inside its junction");
+  } else if (from && to) {
+    merge(b, fmt::format("is {:.3g} mm long and the two need {:.3g}", room.length, room.least));
+  } else {
+    const int node = from ? branch.from : branch.to;
+    extend(b, room.least - room.length + kLeastBody * room.radius);
+    dirty_[index(node)] = 1;
+  }
 }
 
 void SeedPlan::settle() {
@@ -361,6 +466,11 @@ void SeedPlan::settle() {
     std::vector<int> work;
     for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
       if (dirty_[index(n)] && nodes_[index(n)].is_junction()) work.push_back(n);
+    }
+    if (work.empty()) {
+      std::fill(dirty_.begin(), dirty_.end(), 0);
+      if (!tighten()) return;
+      continue;
     }
     tbb::parallel_for(std::size_t{0}, work.size(),
                       [&](std::size_t k) { measure(nodes_[index(work[k])]); });
@@ -376,73 +486,94 @@ void SeedPlan::settle() {
     };
     std::vector<Short> shorts;
     for (int b = 0; b < static_cast<int>(branches_.size()); ++b) {
-      PlannedBranch& branch = branches_[index(b)];
-      if (!look[index(b)] || !branch.alive) continue;
+      if (!look[index(b)] || !branches_[index(b)].alive) continue;
       const Room room = room_of(b);
       if (!room.known) continue;
-      const bool between = nodes_[index(branch.from)].is_junction() &&
-                           nodes_[index(branch.to)].is_junction() && branch.from != branch.to;
-      const double chord =
-          (nodes_[index(branch.to)].center_mm - nodes_[index(branch.from)].center_mm).norm();
-      if (between && !branch.straight && chord > kStraightEnough * branch.length_mm() &&
-          room.length < room.least + kBendingRoom * room.radius) {
-        branch.straight = true;
-        dirty_[index(branch.from)] = dirty_[index(branch.to)] = 1;
-        continue;
+      if (straighten(b, room, 0.0)) {
+        dirty_[index(branches_[index(b)].from)] = dirty_[index(branches_[index(b)].to)] = 1;
+      } else if (room.length < room.least * (1 - kRounding)) {
+        shorts.push_back({b, room});
       }
-      if (room.length < room.least) shorts.push_back({b, room});
     }
+    // The shortest first; what this round has already changed is measured again before more is
+    // done.
     std::stable_sort(shorts.begin(), shorts.end(), [](const Short& x, const Short& y) {
       return x.room.length * y.room.least < y.room.length * x.room.least;
     });
     for (const Short& s : shorts) {
       const PlannedBranch& branch = branches_[index(s.branch)];
-      // What this round has already changed is measured again first.
       if (!branch.alive || dirty_[index(branch.from)] || dirty_[index(branch.to)]) continue;
-      const bool from = nodes_[index(branch.from)].is_junction();
-      const bool to = nodes_[index(branch.to)].is_junction();
-      if (from && to && branch.from == branch.to) {
-        drop(s.branch, "a loop that lies inside its junction");
-      } else if (from && to) {
-        merge(s.branch, fmt::format("is {:.3g} mm long and the two need {:.3g}", s.room.length,
-                                    s.room.least));
-      } else {
-        extend(s.branch, s.room.least - s.room.length);
-        dirty_[index(from ? branch.from : branch.to)] = 1;
-      }
+      make_room(s.branch, s.room);
     }
-    if (std::none_of(dirty_.begin(), dirty_.end(), [](char d) { return d != 0; })) break;
   }
-  set_longest();
+  tighten();
 }
 
-// What is left between two openings is shared so that neither passes the other.
-void SeedPlan::set_longest() {
-  for (int b = 0; b < static_cast<int>(branches_.size()); ++b) {
-    const PlannedBranch& branch = branches_[index(b)];
-    if (!branch.alive) continue;
-    const Room room = room_of(b);
-    if (!room.known) continue;
-    const double spare = room.length - room.least;
-    const double wish = room.wanted - room.least;
-    for (const bool at_end : {false, true}) {
-      const BranchEnd end{b, at_end};
-      PlannedNode& node = node_at(end);
-      if (!node.is_junction()) continue;
-      const auto k = index(slot_of(end));
-      const double own = end_along(b, at_end, true) - end_along(b, at_end, false);
-      // In proportion to the wishes while they do not fit, half of the surplus each when they do.
-      const double part = spare < wish ? spare * own / wish : own + (spare - wish) / 2;
-      const double along = end_along(b, at_end, false) + part;
-      const Vec3 place = branch.at(at_end ? branch.length_mm() - along : along).head<3>();
-      const double distance = branch.straight ? along : (place - node.center_mm).norm();
-      node.spec.branches[k].longest_mm = std::max(distance, node.least_mm[k] * (1 + 1e-9));
+// Shares the length of a branch between its openings and its body: each gets its least; what is
+// left goes by the wishes, of which the body's is the length in which it can turn. True if an
+// opening had to come nearer than planned.
+bool SeedPlan::share_room(int b) {
+  const PlannedBranch& branch = branches_[index(b)];
+  const Room room = room_of(b);
+  if (!room.known) return false;
+  const double body = least_body(branch) * room.radius;
+  const double straight_part = std::max(room.length - room.wanted + body, body);
+  const double turning = std::max(0.0, straight_part * bend_of(b) / kTightestBend - body);
+  const double spare = room.length - room.least;
+  const double wish = room.wanted - room.least + turning;
+  bool nearer = false;
+  for (const bool at_end : {false, true}) {
+    const BranchEnd end{b, at_end};
+    PlannedNode& node = node_at(end);
+    if (!node.is_junction()) continue;
+    const auto k = index(slot_of(end));
+    const double least = end_along(b, at_end, false);
+    const double own = end_along(b, at_end, true) - least;
+    const double part = spare < wish ? std::max(0.0, spare) * own / wish : own + (spare - wish) / 2;
+    const double along = least + part;
+    const Vec3 place = branch.at(at_end ? branch.length_mm() - along : along).head<3>();
+    const double distance = branch.straight ? along : (place - node.center_mm).norm();
+    const double longest = std::max(distance, node.least_mm[k] * (1 + kRounding));
+    node.spec.branches[k].longest_mm = longest;
+    if (longest < node.wanted_mm[k] - kWorthTightening * node.spec.branches[k].radius_mm) {
+      node.caps_mm[k] = longest;
+      dirty_[index(at_end ? branch.to : branch.from)] = 1;
+      nearer = true;
     }
   }
+  return nearer;
+}
+
+// Shares out the room of every branch; directions of openings that came nearer are measured again.
+bool SeedPlan::tighten() {
+  bool again = false;
+  for (int b = 0; b < static_cast<int>(branches_.size()); ++b) {
+    if (!branches_[index(b)].alive) continue;
+    const bool nearer = share_room(b);
+    again = again || nearer;
+    if (!nearer && straighten(b, room_of(b), bend_of(b))) {
+      dirty_[index(branches_[index(b)].from)] = dirty_[index(branches_[index(b)].to)] = 1;
+      again = true;
+    }
+  }
+  return again;
 }
 
 void SeedPlan::reach_farther(int n, double factor) {
   nodes_[index(n)].reach *= factor;
+  dirty_[index(n)] = 1;
+}
+
+// Along the mean of the branches' directions: seen from there they part at wider angles.
+void SeedPlan::move_forward(int n, double radii) {
+  PlannedNode& node = nodes_[index(n)];
+  Vec3 mean = Vec3::Zero();
+  double radius = 0;
+  for (const JunctionBranch& branch : node.spec.branches) {
+    mean += branch.direction;
+    radius += branch.radius_mm / static_cast<double>(node.spec.branches.size());
+  }
+  node.center_mm += radii * radius * mean / static_cast<double>(node.spec.branches.size());
   dirty_[index(n)] = 1;
 }
 

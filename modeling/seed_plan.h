@@ -24,7 +24,8 @@ struct PlannedBranch {
   std::vector<double> along_mm;  // arc length at each sample
   int from = -1;                 // nodes of the plan
   int to = -1;
-  bool straight = false;  // too short to bend: runs straight between its two nodes
+  bool straight = false;        // too short to bend: runs straight between its two nodes
+  bool tried_straight = false;  // it was, and had too little room
   bool alive = true;
 
   double length_mm() const { return along_mm.back(); }
@@ -46,7 +47,9 @@ struct PlannedNode {
   // Of a junction, once it is measured; in the order of `ends`.
   JunctionSpec spec;
   std::vector<double> wanted_mm;  // distance of each opening with room to spare
-  std::vector<double> least_mm;   // and with the least margin
+  std::vector<double> least_mm;   // and with the least margin and blend
+  std::vector<double> meets_mm;   // distance from which on the body follows the branch's path
+  std::vector<double> caps_mm;    // the branch leaves no room for an opening farther out
   std::optional<Error> error;     // why no openings could be found
   double reach = 1.0;             // directions are taken at this multiple of the openings' distance
 
@@ -68,6 +71,7 @@ class SeedPlan {
   // no farther than `radii` of the branch between them. False if there is none. Then settle()
   // again.
   void reach_farther(int node, double factor);
+  void move_forward(int node, double radii);
   bool merge_with_nearest(int node, double radii);
   void settle();
 
@@ -76,10 +80,15 @@ class SeedPlan {
   void measure(PlannedNode& node) const;
   Room room_of(int branch) const;
   double end_along(int branch, bool at_end, bool wanted) const;
-  void set_longest();
+  double planned_mm(BranchEnd end) const;
+  double bend_of(int branch) const;
+  bool share_room(int branch);
+  bool tighten();
   void extend(int branch, double missing_mm);
   void drop(int branch, const std::string& why);
   void merge(int branch, const std::string& why);
+  bool straighten(int branch, const Room& room, double bend);
+  void make_room(int branch, const Room& room);
   void join_through(int node);
   void detach(BranchEnd end);
   PlannedNode& node_at(BranchEnd end);
