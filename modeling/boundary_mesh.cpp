@@ -151,7 +151,7 @@ class Mesher {
     }
     std::sort(inner.begin(), inner.end());
     Chain chain;
-    const auto at = [&](double t) { return edge.curve ? Vec3(edge.curve->at(t)) : edge.point(t); };
+    const auto at = [&](double t) { return edge.point(t).at; };
     chain.push_back({edge.from, vertex_point(edge.first_vertex, at(edge.from))});
     for (const double t : inner) chain.push_back({t, add_point(at(t))});
     chain.push_back({edge.to, vertex_point(edge.last_vertex, at(edge.to))});

@@ -37,8 +37,10 @@ BoundaryEdge edge_of(const BoundaryModel& model, const NetworkEdge& edge) {
   result.to = edge.sides[0].to;
   result.first_vertex = edge.first_vertex;
   result.last_vertex = edge.last_vertex;
-  result.curve = std::make_shared<BSplineCurve<3>>(
-      side_curve(*model.faces[index(edge.sides[0].patch)].patch, edge.sides[0].side));
+  BSplineCurve<3> curve =
+      side_curve(*model.faces[index(edge.sides[0].patch)].patch, edge.sides[0].side);
+  result.breaks = breaks_between(curve.knots(), result.from, result.to);
+  result.point = edge_points(std::move(curve));
   result.uses.push_back(use_of(edge, 0));
   if (edge.is_join()) result.uses.push_back(use_of(edge, 1));
   return result;
@@ -53,8 +55,8 @@ std::pair<Vec3, Vec3> plane_of(const Rim& rim, const std::vector<LoopEdge>& loop
     constexpr int kChords = 16;
     for (int k = 0; k < kChords; ++k) {
       const double h = (edge.to - edge.from) / kChords;
-      const Vec3 a = edge.curve->at(edge.from + k * h) - rim.center_mm;
-      const Vec3 b = edge.curve->at(edge.from + (k + 1) * h) - rim.center_mm;
+      const Vec3 a = edge.point(edge.from + k * h).at - rim.center_mm;
+      const Vec3 b = edge.point(edge.from + (k + 1) * h).at - rim.center_mm;
       area += (step.forward ? 0.5 : -0.5) * a.cross(b);
     }
   }
@@ -88,6 +90,25 @@ BSplineCurve<3> side_curve(const BSplineSurface<3>& patch, PatchSide side) {
     points.col(k) = along_v ? patch.control_point(row, k) : patch.control_point(k, row);
   }
   return BSplineCurve<3>(knots, std::move(points));
+}
+
+std::function<EdgePoint<Vec3>(double)> edge_points(BSplineCurve<3> curve) {
+  const auto shared = std::make_shared<const BSplineCurve<3>>(std::move(curve));
+  return [shared](double t) {
+    const BasisValues b = basis_at(shared->knots(), t, 1);
+    const auto points = shared->control_points().middleCols(b.first, shared->knots().order());
+    return EdgePoint<Vec3>{points * b.values.row(0).transpose(),
+                           points * b.values.row(1).transpose()};
+  };
+}
+
+std::vector<double> breaks_between(const KnotVector& knots, double from, double to) {
+  std::vector<double> breaks{from};
+  for (const double b : knots.breakpoints()) {
+    if (b > from && b < to) breaks.push_back(b);
+  }
+  breaks.push_back(to);
+  return breaks;
 }
 
 Result<BoundaryModel> boundary_of(const SurfaceNetwork& network) {

@@ -44,11 +44,17 @@ struct BoundaryFace {
 
   bool is_whole = false;  // the face is all of its patch, and its edges lie on the patch's sides
 
-  // Given where they cannot be found from a whole patch or from a plane's edges.
-  std::optional<double> area_mm2;
-  std::optional<double> volume_mm3;                   // of the cone from the origin
+  // For faces that are neither whole patches nor planes between splines.
+  double u_reference = 0.0;                           // area is integrated along u from here
+  std::vector<double> u_breaks;                       // where the surface is less smooth
   std::optional<std::pair<Vec3, Vec3>> bounding_box;  // lowest, highest
   FaceTriangles mesh;
+};
+
+// A point of an edge, in space or in a face's parameters, and its derivative.
+template <typename Vector>
+struct EdgePoint {
+  Vector at, derivative;
 };
 
 // How an edge lies on a face.
@@ -61,7 +67,7 @@ struct EdgeUse {
   double side_from = 0.0;
   double side_to = 1.0;
   // Otherwise the parameters on the face, or nothing on planes.
-  std::function<Vec2(double)> parameters;
+  std::function<EdgePoint<Vec2>(double)> parameters;
 };
 
 struct BoundaryEdge {
@@ -70,8 +76,8 @@ struct BoundaryEdge {
   int first_vertex = -1;
   int last_vertex = -1;
   bool is_degenerate = false;                    // a point
-  std::shared_ptr<const BSplineCurve<3>> curve;  // polynomial, over [from, to]; or
-  std::function<Vec3(double)> point;             // anything else
+  std::function<EdgePoint<Vec3>(double)> point;  // empty for degenerate edges
+  std::vector<double> breaks;  // from `from` to `to`: between them the curve is smooth
   std::vector<EdgeUse> uses;
 };
 
@@ -97,5 +103,9 @@ Vec2 side_parameters(const BSplineSurface<3>& patch, PatchSide side, double t);
 
 // Boundary row of a patch: the curve of its side.
 BSplineCurve<3> side_curve(const BSplineSurface<3>& patch, PatchSide side);
+
+// Point and derivative of a spline, as an edge wants them; and the breaks of [from, to].
+std::function<EdgePoint<Vec3>(double)> edge_points(BSplineCurve<3> curve);
+std::vector<double> breaks_between(const KnotVector& knots, double from, double to);
 
 }  // namespace angiospline

@@ -32,6 +32,14 @@ std::optional<Vec3> confirmed(const BoundaryModel& model, const TriangleCrossing
   return place;
 }
 
+// Faces that lie loose side by side touch all along their edges, which triangles cannot tell from
+// crossing: only where every edge has two faces are different faces compared.
+bool has_free_edges(const BoundaryModel& model) {
+  return std::any_of(model.edges.begin(), model.edges.end(), [](const BoundaryEdge& edge) {
+    return !edge.is_degenerate && edge.uses.size() == 1;
+  });
+}
+
 }  // namespace
 
 Result<SelfIntersection> find_self_intersection(const BoundaryModel& model, int most_triangles,
@@ -52,7 +60,9 @@ Result<SelfIntersection> find_self_intersection(const BoundaryModel& model, int 
   if (progress.should_stop()) return fail(cancelled("find self-intersections"));
   const std::vector<TriangleCrossing> crossings =
       crossing_triangles(mesh.points, mesh.triangles, mesh.face_of, progress);
+  const bool is_open = has_free_edges(model);
   for (const TriangleCrossing& crossing : crossings) {
+    if (is_open && crossing.groups[0] != crossing.groups[1]) continue;
     if (progress.should_stop()) return fail(cancelled("find self-intersections"));
     if (const auto place = confirmed(model, crossing, options)) {
       result.found = true;

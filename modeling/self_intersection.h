@@ -20,6 +20,8 @@ struct SelfIntersection {
 // Searches a mesh of the surface, whose faces share the points of their edges, for triangles that
 // cross although they share no edge. What is found on a coarse mesh counts only if it stays when
 // the two faces are meshed four times as fine, so that chords across tight places raise no alarm.
+// On a surface with free edges only
+// crossings of a face with itself count: loose neighbours touch all along their edges.
 // O(n log n) in the triangles. Errors: stopped on request.
 Result<SelfIntersection> find_self_intersection(const BoundaryModel& model, int most_triangles,
                                                 const Progress& progress = {});

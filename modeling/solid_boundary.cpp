@@ -6,11 +6,10 @@
 #include <BRepBndLib.hxx>
 #include <BRepBuilderAPI_Copy.hxx>
 #include <BRepCheck_Analyzer.hxx>
-#include <BRepGProp.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepTools.hxx>
 #include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
-#include <GProp_GProps.hxx>
 #include <Geom2d_Curve.hxx>
 #include <Geom_Plane.hxx>
 #include <Geom_RectangularTrimmedSurface.hxx>
@@ -18,6 +17,7 @@
 #include <Poly_Triangulation.hxx>
 #include <Precision.hxx>
 #include <Standard_Failure.hxx>
+#include <TColStd_Array1OfReal.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopTools_IndexedMapOfShape.hxx>
@@ -37,13 +37,23 @@ namespace {
 
 // Parameters count as equal within this share of the domain: files keep 15 digits.
 constexpr double kParameterTolerance = 1e-9;
-// Relative accuracy of areas and volumes that are not integrated by Gauss's rule.
-constexpr double kQuadratureTolerance = 1e-9;
+// Panels for curves that are not splines.
+constexpr int kPanels = 8;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 Vec3 vec(const gp_XYZ& p) { return {p.X(), p.Y(), p.Z()}; }
 
 Vec3 transformed(const gp_Trsf& place, const gp_Pnt& p) { return vec(p.Transformed(place).XYZ()); }
+
+// The knots between two parameters, both included.
+std::vector<double> breaks_of(const TColStd_Array1OfReal& knots, double from, double to) {
+  std::vector<double> breaks{from};
+  for (const double k : knots) {
+    if (k > from && k < to) breaks.push_back(k);
+  }
+  breaks.push_back(to);
+  return breaks;
+}
 
 struct Domain {
   double u0, u1, v0, v1;
@@ -114,7 +124,6 @@ class BoundaryBuilder {
       if (f % 64 == 0 && progress_.should_stop()) return fail(cancelled("measure"));
       add_face(static_cast<int>(f));
     }
-    for (std::size_t f = 0; f < faces_.size(); ++f) complete_face(static_cast<int>(f));
     if (needs_mesh_) add_mesh();
     if (progress_.should_stop()) return fail(cancelled("measure"));
     model_.is_sound = BRepCheck_Analyzer(shape_, true, true).IsValid();
@@ -131,15 +140,30 @@ class BoundaryBuilder {
     TopLoc_Location place;
     const Handle(Geom_Curve) curve = BRep_Tool::Curve(edge, place, result.from, result.to);
     result.is_degenerate = BRep_Tool::Degenerated(edge) || curve.IsNull();
-    if (curve.IsNull()) return;
+    if (curve.IsNull()) {
+      BRep_Tool::Range(edge, result.from, result.to);
+      result.breaks = {result.from, result.to};
+      return;
+    }
     const gp_Trsf trsf = place.Transformation();
-    const auto spline = Handle(Geom_BSplineCurve)::DownCast(curve);
-    if (!spline.IsNull() && place.IsIdentity()) {
-      if (auto own = from_occt(*spline)) {
-        result.curve = std::make_shared<BSplineCurve<3>>(*std::move(own));
+    auto spline = Handle(Geom_BSplineCurve)::DownCast(curve);
+    if (!spline.IsNull()) {
+      result.breaks = breaks_of(spline->Knots(), result.from, result.to);
+      if (auto own = from_occt(*spline); own && place.IsIdentity()) {
+        result.point = edge_points(*std::move(own));
+        return;
+      }
+    } else {
+      for (int k = 0; k <= kPanels; ++k) {
+        result.breaks.push_back(result.from + (result.to - result.from) * k / kPanels);
       }
     }
-    result.point = [curve, trsf](double t) { return transformed(trsf, curve->Value(t)); };
+    result.point = [curve, trsf](double t) {
+      gp_Pnt p;
+      gp_Vec d;
+      curve->D1(t, p, d);
+      return EdgePoint<Vec3>{transformed(trsf, p), vec(d.Transformed(trsf).XYZ())};
+    };
   }
 
   // Shells, their solids, and the faces, in the order in which TopExp_Explorer meets the faces.
@@ -201,6 +225,7 @@ class BoundaryBuilder {
                         vec(suu.XYZ()),       vec(suv.XYZ()), vec(svv.XYZ())};
     };
     add_uses(number, surface);
+    complete_face(number, surface);
   }
 
   void add_uses(int number, const Handle(Geom_Surface) & surface) {
@@ -211,7 +236,6 @@ class BoundaryBuilder {
     face.loops = 0;
     double covered = 0;  // of the domain's perimeter, each direction counting 2
     bool all_on_sides = face.patch != nullptr;
-    bool all_polynomial = true;
     for (TopExp_Explorer wire(shape, TopAbs_WIRE); wire.More(); wire.Next()) {
       ++face.loops;
       for (TopExp_Explorer at(wire.Current(), TopAbs_EDGE); at.More(); at.Next()) {
@@ -225,48 +249,50 @@ class BoundaryBuilder {
         const Handle(Geom2d_Curve) curve =
             face.plane ? Handle(Geom2d_Curve)() : BRep_Tool::CurveOnSurface(edge, shape, from, to);
         if (!curve.IsNull()) {
-          const double edge_from = result.from, edge_to = result.to;
-          const bool own_range = result.is_degenerate;
+          const double edge_from = result.from;
+          const double rate = (to - from) / (result.to - result.from);
           if (!all_on_sides || !find_side(*curve, from, to, domain, use)) all_on_sides = false;
           if (use.on_side) {
             const bool along_v = use.side == PatchSide::kU0 || use.side == PatchSide::kU1;
             covered += std::abs(use.side_to - use.side_from) /
                        (along_v ? domain.v1 - domain.v0 : domain.u1 - domain.u0);
           }
-          use.parameters = [curve, from, to, edge_from, edge_to, own_range](double t) {
-            const double s =
-                own_range ? t : from + (t - edge_from) / (edge_to - edge_from) * (to - from);
-            const gp_Pnt2d p = curve->Value(s);
-            return Vec2(p.X(), p.Y());
+          use.parameters = [curve, from, edge_from, rate](double t) {
+            gp_Pnt2d p;
+            gp_Vec2d d;
+            curve->D1(from + (t - edge_from) * rate, p, d);
+            return EdgePoint<Vec2>{{p.X(), p.Y()}, {d.X() * rate, d.Y() * rate}};
           };
         } else {
           all_on_sides = false;
         }
-        if (result.is_degenerate || !result.curve) all_polynomial = false;
         result.uses.push_back(std::move(use));
       }
     }
     face.is_whole = all_on_sides && face.loops == 1 && std::abs(covered - 4) <= 1e-6;
-    is_simple_.push_back(face.is_whole || (face.plane && face.loops >= 1 && all_polynomial));
+    needs_mesh_ = needs_mesh_ || !(face.is_whole || (face.plane && face.loops == 1));
     if (!face.is_whole) face.patch = nullptr;  // a trimmed one is measured through its evaluator
   }
 
-  void complete_face(int number) {
+  // What measuring a trimmed face in its parameters needs, and its box (1e-7 mm too large).
+  void complete_face(int number, const Handle(Geom_Surface) & surface) {
     BoundaryFace& face = model_.faces[index(number)];
-    if (is_simple_[index(number)]) return;
+    if (face.is_whole || face.plane) return;
     const TopoDS_Face& shape = faces_[index(number)];
-    GProp_GProps area;
-    BRepGProp::SurfaceProperties(shape, area, kQuadratureTolerance);
-    face.area_mm2 = area.Mass();
-    GProp_GProps volume;
-    BRepGProp::VolumePropertiesGK(shape, volume, kQuadratureTolerance, false, false, false, false);
-    face.volume_mm3 = volume.Mass();
     Bnd_Box box;
     BRepBndLib::AddOptimal(shape, box, false, false);
     if (!box.IsVoid()) {
       face.bounding_box = {vec(box.CornerMin().XYZ()), vec(box.CornerMax().XYZ())};
     }
-    needs_mesh_ = true;
+    double u0 = 0, u1 = 0, v0 = 0, v1 = 0;
+    BRepTools::UVBounds(shape, u0, u1, v0, v1);
+    face.u_reference = u0;
+    const auto spline = Handle(Geom_BSplineSurface)::DownCast(surface);
+    if (!spline.IsNull()) {
+      face.u_breaks = breaks_of(spline->UKnots(), u0, u1);
+    } else {
+      for (int k = 0; k <= kPanels; ++k) face.u_breaks.push_back(u0 + (u1 - u0) * k / kPanels);
+    }
   }
 
   // Triangles that share the points of their edges.
@@ -359,7 +385,6 @@ class BoundaryBuilder {
   BoundaryModel model_;
   TopTools_IndexedMapOfShape edges_;
   std::vector<TopoDS_Face> faces_;
-  std::vector<bool> is_simple_;
   bool needs_mesh_ = false;
 };
 
