@@ -7,129 +7,59 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "recovery/foreground.h"
+
 namespace angiospline {
 namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
-constexpr int kColumns = 16;  // columns read together: one cache line of float
 
-// Room for one pass over a line of n samples.
-struct Line {
-  explicit Line(int n)
-      : value(static_cast<std::size_t>(n)),
-        apex(static_cast<std::size_t>(n)),
-        from(static_cast<std::size_t>(n)) {}
-  std::vector<float> value;
-  std::vector<int> apex;     // of the parabolas of the lower envelope
-  std::vector<double> from;  // where each begins to be the lowest
+// The lower envelope of parabolas f(j) + (step (i - j))^2 over a line of samples.
+class Envelope {
+ public:
+  // value[i * stride] becomes the envelope at i, for i in [0, n). Values may be infinite.
+  void transform(float* value, std::size_t stride, int n, double step) {
+    apexes_.clear();
+    const double step2 = step * step;
+    for (int i = 0; i < n; ++i) {
+      const double f = static_cast<double>(value[static_cast<std::size_t>(i) * stride]);
+      if (f == static_cast<double>(kFar)) continue;
+      double from = -std::numeric_limits<double>::infinity();
+      while (!apexes_.empty()) {
+        const Apex& last = apexes_.back();
+        from = 0.5 * ((f - last.value) / (step2 * (i - last.at)) + i + last.at);
+        if (from > last.from) break;
+        apexes_.pop_back();
+        from = -std::numeric_limits<double>::infinity();
+      }
+      apexes_.push_back({i, f, from});
+    }
+    if (apexes_.empty()) return;
+    std::size_t k = 0;
+    for (int i = 0; i < n; ++i) {
+      while (k + 1 < apexes_.size() && apexes_[k + 1].from < i) ++k;
+      const double d = step * (i - apexes_[k].at);
+      value[static_cast<std::size_t>(i) * stride] = static_cast<float>(d * d + apexes_[k].value);
+    }
+  }
+
+ private:
+  struct Apex {
+    int at;
+    double value;
+    double from;  // where it begins to be the lowest
+  };
+  std::vector<Apex> apexes_;
 };
 
-// value[i] becomes min over j of value[j] + (step (i - j))^2, by the lower envelope of parabolas.
-void transform(Line& line, double step) {
-  const auto n = static_cast<int>(line.value.size());
-  const auto f = [&](int i) {
-    return static_cast<double>(line.value[static_cast<std::size_t>(i)]);
-  };
-  const double step2 = step * step;
-  int top = -1;
-  for (int i = 0; i < n; ++i) {
-    if (f(i) == static_cast<double>(kFar)) continue;
-    double begin = -std::numeric_limits<double>::infinity();
-    while (top >= 0) {
-      const int j = line.apex[static_cast<std::size_t>(top)];
-      begin = 0.5 * ((f(i) - f(j)) / (step2 * (i - j)) + i + j);
-      if (begin > line.from[static_cast<std::size_t>(top)]) break;
-      --top;
-    }
-    if (top < 0) begin = -std::numeric_limits<double>::infinity();
-    ++top;
-    line.apex[static_cast<std::size_t>(top)] = i;
-    line.from[static_cast<std::size_t>(top)] = begin;
-  }
-  if (top < 0) return;
-  // A parabola's value is read before it is overwritten: the apexes' values are kept aside.
-  std::vector<double> apex_value(static_cast<std::size_t>(top) + 1);
-  for (int k = 0; k <= top; ++k)
-    apex_value[static_cast<std::size_t>(k)] = f(line.apex[static_cast<std::size_t>(k)]);
-  int k = 0;
-  for (int i = 0; i < n; ++i) {
-    while (k < top && line.from[static_cast<std::size_t>(k) + 1] < i) ++k;
-    const double d = step * (i - line.apex[static_cast<std::size_t>(k)]);
-    line.value[static_cast<std::size_t>(i)] =
-        static_cast<float>(d * d + apex_value[static_cast<std::size_t>(k)]);
-  }
-}
-
-// Transforms all lines along `axis` (1 or 2) of squared distances, kColumns of them at a time.
-void transform_axis(Image<float>& squared, int axis) {
-  const Voxel n = squared.grid.size;
-  const auto a = static_cast<std::size_t>(axis);
-  const int other = axis == 1 ? n[2] : n[1];
-  const int length = n[a];
-  const std::size_t stride = axis == 1
-                                 ? static_cast<std::size_t>(n[0])
-                                 : static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]);
-  tbb::parallel_for(tbb::blocked_range<int>(0, other), [&](const tbb::blocked_range<int>& range) {
-    std::vector<Line> lines(kColumns, Line(length));
-    for (int o = range.begin(); o < range.end(); ++o)
-      for (int x0 = 0; x0 < n[0]; x0 += kColumns) {
-        const int columns = std::min(kColumns, n[0] - x0);
-        float* base = &squared[axis == 1 ? Voxel{x0, 0, o} : Voxel{x0, o, 0}];
-        bool any = false;
-        for (int i = 0; i < length; ++i)
-          for (int c = 0; c < columns; ++c) {
-            const float v =
-                base[static_cast<std::size_t>(i) * stride + static_cast<std::size_t>(c)];
-            lines[static_cast<std::size_t>(c)].value[static_cast<std::size_t>(i)] = v;
-            any = any || v != 0.0F;
-          }
-        if (!any) continue;
-        for (int c = 0; c < columns; ++c)
-          transform(lines[static_cast<std::size_t>(c)], squared.grid.spacing_mm[axis]);
-        for (int i = 0; i < length; ++i)
-          for (int c = 0; c < columns; ++c)
-            base[static_cast<std::size_t>(i) * stride + static_cast<std::size_t>(c)] =
-                lines[static_cast<std::size_t>(c)].value[static_cast<std::size_t>(i)];
-      }
-  });
-}
-
-// Squared distances along x alone.
-void transform_rows(const Mask& mask, Image<float>& squared) {
-  const Voxel n = mask.grid.size;
-  const double step = mask.grid.spacing_mm[0];
-  tbb::parallel_for(tbb::blocked_range<int>(0, n[2]), [&](const tbb::blocked_range<int>& range) {
-    for (int z = range.begin(); z < range.end(); ++z)
-      for (int y = 0; y < n[1]; ++y) {
-        const std::uint8_t* in = &mask.voxels[mask.grid.offset({0, y, z})];
-        float* out = &squared.voxels[mask.grid.offset({0, y, z})];
-        int last = -1;  // the last background voxel passed
-        for (int x = 0; x < n[0]; ++x) {
-          if (in[x] == 0) last = x;
-          const double d = step * (x - last);
-          out[x] = last < 0 ? kFar : static_cast<float>(d * d);
-        }
-        last = -1;
-        for (int x = n[0] - 1; x >= 0; --x) {
-          if (in[x] == 0) last = x;
-          const double d = step * (last - x);
-          if (last >= 0) out[x] = std::min(out[x], static_cast<float>(d * d));
-        }
-      }
-  });
-}
-
-// An image without background: the distance to the nearest voxel outside.
-void distances_to_outside_mm(Image<float>& distances) {
-  const ImageGrid& g = distances.grid;
-  for (std::size_t i = 0; i < distances.voxels.size(); ++i) {
-    const Voxel v = g.voxel(i);
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t a = 0; a < 3; ++a)
-      least = std::min(least, g.spacing_mm[static_cast<Eigen::Index>(a)] *
-                                  (1 + std::min(v[a], g.size[a] - 1 - v[a])));
-    distances.voxels[i] = static_cast<float>(least);
-  }
+// In an image without background: the distance from a voxel's centre to the outside, `first_step`
+// voxels beyond the border voxels' centres.
+double distance_to_outside_mm(const ImageGrid& grid, const Voxel& v, double first_step) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t a = 0; a < 3; ++a)
+    least = std::min(least, grid.spacing_mm[static_cast<Eigen::Index>(a)] *
+                                (first_step + std::min(v[a], grid.size[a] - 1 - v[a])));
+  return least;
 }
 
 // The first octant of a ball, nearest first, grown on demand; the other octants are reflections.
@@ -206,18 +136,105 @@ bool reaches_background(const Mask& mask, const Voxel& v, const Voxel& d) {
 
 }  // namespace
 
-Image<float> distances_to_background_mm(const Mask& mask) {
-  Image<float> result(mask.grid);
-  if (mask.voxels.empty()) return result;
-  if (std::find(mask.voxels.begin(), mask.voxels.end(), 0) == mask.voxels.end()) {
-    distances_to_outside_mm(result);
-    return result;
+ForegroundDistances::ForegroundDistances(const Mask& mask) : grid_(mask.grid) {
+  find_runs(mask);
+  if (values_.size() == mask.voxels.size()) {
+    for (std::size_t i = 0; i < values_.size(); ++i)
+      values_[i] = static_cast<float>(distance_to_outside_mm(grid_, grid_.voxel(i), 1.0));
+    return;
   }
-  transform_rows(mask, result);
-  transform_axis(result, 1);
-  transform_axis(result, 2);
-  for (float& v : result.voxels) v = std::sqrt(v);
-  return result;
+  transform_across(1);
+  transform_across(2);
+  for (float& v : values_) v = std::sqrt(v);
+}
+
+// Runs of foreground along x, and in each the squared distance to the nearer end that is
+// background.
+void ForegroundDistances::find_runs(const Mask& mask) {
+  const Voxel n = grid_.size;
+  const double step = grid_.spacing_mm[0];
+  row_begin_.assign(static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]) + 1, 0);
+  for (int z = 0; z < n[2]; ++z)
+    for (int y = 0; y < n[1]; ++y) {
+      const std::uint8_t* line = mask.voxels.data() + grid_.offset({0, y, z});
+      for (int x = 0; x < n[0];) {
+        x = static_cast<int>(
+            next_foreground(line, static_cast<std::size_t>(x), static_cast<std::size_t>(n[0])));
+        const int begin = x;
+        while (x < n[0] && line[x] != 0) ++x;
+        if (x == begin) continue;
+        runs_.push_back({begin, x, values_.size()});
+        for (int i = begin; i < x; ++i) {
+          const double before = begin > 0 ? step * (i - begin + 1) : static_cast<double>(kFar);
+          const double after = x < n[0] ? step * (x - i) : static_cast<double>(kFar);
+          const double d = std::min(before, after);
+          values_.push_back(static_cast<float>(d * d));
+        }
+      }
+      row_begin_[row(y, z) + 1] = runs_.size();
+    }
+}
+
+// Slices that hold the axis and x are spread into a plane with room for one background sample on
+// either side, transformed stretch by stretch, and gathered again.
+void ForegroundDistances::transform_across(int axis) {
+  const Voxel n = grid_.size;
+  const auto along = static_cast<std::size_t>(axis);
+  const int slices = axis == 1 ? n[2] : n[1];
+  const auto width = static_cast<std::size_t>(n[0]);
+  const double step = grid_.spacing_mm[axis];
+  tbb::parallel_for(tbb::blocked_range<int>(0, slices), [&](const tbb::blocked_range<int>& range) {
+    std::vector<float> plane(width * static_cast<std::size_t>(n[along]), 0.0F);
+    Envelope envelope;
+    for (int slice = range.begin(); slice < range.end(); ++slice) {
+      const auto for_runs = [&](const auto& use) {
+        for (int i = 0; i < n[along]; ++i) {
+          const std::size_t r = axis == 1 ? row(i, slice) : row(slice, i);
+          for (std::size_t k = row_begin_[r]; k < row_begin_[r + 1]; ++k)
+            use(i, runs_[k], plane.data() + static_cast<std::size_t>(i) * width);
+        }
+      };
+      for_runs([&](int, const Run& run, float* line) {
+        std::copy_n(values_.data() + run.first, run.end - run.begin, line + run.begin);
+      });
+      for_runs([&](int i, const Run& run, float* line) {
+        for (int x = run.begin; x < run.end; ++x) {
+          float* top = line + x;
+          if (i > 0 && *(top - width) != 0.0F) continue;  // not the first of its stretch
+          int end = i + 1;
+          while (end < n[along] && top[static_cast<std::size_t>(end - i) * width] != 0.0F) ++end;
+          const int before = i > 0 ? 1 : 0;  // a background sample, 0, is part of the line
+          const int after = end < n[along] ? 1 : 0;
+          envelope.transform(top - (before == 1 ? width : 0), width, end - i + before + after,
+                             step);
+        }
+      });
+      for_runs([&](int, const Run& run, float* line) {
+        std::copy_n(line + run.begin, run.end - run.begin, values_.data() + run.first);
+        std::fill(line + run.begin, line + run.end, 0.0F);
+      });
+    }
+  });
+}
+
+double ForegroundDistances::at_mm(std::size_t offset) const {
+  const Voxel v = grid_.voxel(offset);
+  const auto first = runs_.begin() + static_cast<std::ptrdiff_t>(row_begin_[row(v[1], v[2])]);
+  const auto last = runs_.begin() + static_cast<std::ptrdiff_t>(row_begin_[row(v[1], v[2]) + 1]);
+  const auto run =
+      std::upper_bound(first, last, v[0], [](int x, const Run& r) { return x < r.end; });
+  EXPECTS(run != last && run->begin <= v[0]);
+  return static_cast<double>(values_[run->first + static_cast<std::size_t>(v[0] - run->begin)]);
+}
+
+Image<float> ForegroundDistances::image() const {
+  Image<float> image(grid_);
+  for (int z = 0; z < grid_.size[2]; ++z)
+    for (int y = 0; y < grid_.size[1]; ++y)
+      for (std::size_t k = row_begin_[row(y, z)]; k < row_begin_[row(y, z) + 1]; ++k)
+        std::copy_n(values_.data() + runs_[k].first, runs_[k].end - runs_[k].begin,
+                    &image[{runs_[k].begin, y, z}]);
+  return image;
 }
 
 std::vector<double> boundary_distances_mm(const Mask& mask,
@@ -236,11 +253,7 @@ std::vector<double> boundary_distances_mm(const Mask& mask,
     const Shells::Entry* entry = shells.at(i);
     while (entry && !reaches_background(mask, v, entry->d)) entry = shells.at(++i);
     if (!entry) {  // no background at all
-      double least = std::numeric_limits<double>::infinity();
-      for (std::size_t a = 0; a < 3; ++a)
-        least = std::min(least, mask.grid.spacing_mm[static_cast<Eigen::Index>(a)] *
-                                    (0.5 + std::min(v[a], mask.grid.size[a] - 1 - v[a])));
-      result.push_back(least);
+      result.push_back(distance_to_outside_mm(mask.grid, v, 0.5));
       last_mm = 0.0;
       continue;
     }

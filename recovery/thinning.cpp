@@ -6,6 +6,7 @@
 #include <deque>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -23,12 +24,6 @@ constexpr std::uint8_t kRim = 8;       // so close to the image's border that re
 constexpr std::uint8_t kKept = 16;     // is never removed
 
 constexpr std::size_t kWorthThreads = 1 << 13;
-
-bool eight_zeros(const std::uint8_t* p) {
-  std::uint64_t word = 0;
-  std::memcpy(&word, p, sizeof word);
-  return word == 0;
-}
 
 // Subfield of a voxel: the parities of its coordinates. Two voxels of one subfield never touch.
 unsigned subfield(const Voxel& v) {
@@ -53,7 +48,7 @@ class Thinner {
   }
 
   // Distances decide the layer in which a voxel may go first: its distance in steps of `step`.
-  void order_by_distance(const Image<float>& distances_mm, double step_mm) {
+  void order_by_distance(const ForegroundDistances& distances_mm, double step_mm) {
     distances_mm_ = &distances_mm;
     step_mm_ = step_mm;
   }
@@ -61,19 +56,14 @@ class Thinner {
   // Flags every foreground voxel and lists the boundary.
   void find_boundary() {
     const Voxel& n = mask_.grid.size;
-    std::size_t offset = 0;
+    const auto width = static_cast<std::size_t>(n[0]);
     for (int z = 0; z < n[2]; ++z)
-      for (int y = 0; y < n[1]; ++y)
-        for (int x = 0; x < n[0];) {
-          if (x + 8 <= n[0] && eight_zeros(&mask_.voxels[offset])) {
-            x += 8;
-            offset += 8;
-            continue;
-          }
-          if (mask_.voxels[offset] != 0) admit({x, y, z}, offset);
-          ++x;
-          ++offset;
-        }
+      for (int y = 0; y < n[1]; ++y) {
+        const std::size_t row = mask_.grid.offset({0, y, z});
+        const std::uint8_t* values = mask_.voxels.data() + row;
+        for (std::size_t x = 0; (x = next_foreground(values, x, width)) < width; ++x)
+          admit({static_cast<int>(x), y, z}, row + x);
+      }
   }
 
   // The same for a list of voxels; the image around them must already be 0 and 1.
@@ -132,7 +122,7 @@ class Thinner {
   void wait(std::size_t offset, unsigned field, std::size_t earliest) {
     std::size_t layer = earliest;
     if (distances_mm_) {
-      const double steps = static_cast<double>(distances_mm_->voxels[offset]) / step_mm_;
+      const double steps = distances_mm_->at_mm(offset) / step_mm_;
       const auto own = static_cast<std::size_t>(std::max(0.0, std::ceil(steps) - 1.0));
       layer = std::max(earliest, own > layer_ ? own - layer_ : 0);
     }
@@ -200,7 +190,7 @@ class Thinner {
   Mask& mask_;
   Connectivity connectivity_;
   bool keeps_end_points_;
-  const Image<float>* distances_mm_ = nullptr;
+  const ForegroundDistances* distances_mm_ = nullptr;
   double step_mm_ = 1.0;
   std::array<std::ptrdiff_t, 26> strides_{};
   std::array<unsigned, 26> flips_{};
@@ -218,12 +208,12 @@ void to_zero_and_one(Mask& mask) {
 
 template <typename Offset>
 Result<Mask> thin_with(Mask mask, const ThinningOptions& options, const Progress& progress) {
-  Image<float> distances_mm;
+  std::optional<ForegroundDistances> distances_mm;
   Thinner<Offset> thinner(mask, options.connectivity, true);
   if (options.order == ThinningOrder::kDistance) {
-    distances_mm = distances_to_background_mm(mask);
+    distances_mm.emplace(mask);
     // Fine enough that no voxel's layer comes after the one in which its turn would come by faces.
-    thinner.order_by_distance(distances_mm, mask.grid.spacing_mm.minCoeff() / std::numbers::sqrt3);
+    thinner.order_by_distance(*distances_mm, mask.grid.spacing_mm.minCoeff() / std::numbers::sqrt3);
   }
   thinner.find_boundary();
   if (!thinner.run(progress)) return fail(cancelled("thin"));
@@ -250,20 +240,6 @@ void rethin(Mask& mask, const std::vector<std::size_t>& voxels,
     if (mask.voxels[offset] != 0) mask.voxels[offset] = kForeground;
   for (const std::size_t offset : kept)
     if (mask.voxels[offset] != 0) mask.voxels[offset] = kForeground;
-}
-
-std::vector<std::size_t> foreground_offsets(const Mask& mask) {
-  std::vector<std::size_t> offsets;
-  const std::size_t count = mask.voxels.size();
-  for (std::size_t i = 0; i < count;) {
-    if (i + 8 <= count && eight_zeros(&mask.voxels[i])) {
-      i += 8;
-      continue;
-    }
-    if (mask.voxels[i] != 0) offsets.push_back(i);
-    ++i;
-  }
-  return offsets;
 }
 
 }  // namespace angiospline

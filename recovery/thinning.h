@@ -3,6 +3,7 @@
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "recovery/foreground.h"
 #include "recovery/image.h"
 #include "recovery/neighborhood.h"
 
@@ -12,7 +13,8 @@ namespace angiospline {
 enum class ThinningOrder {
   kSubfields,  // thesis 4.2: layer by layer, each layer in eight subfields (four in 2-D)
   kDistance,   // by growing distance to the background in mm, then by subfields: keeps the axis in
-               // the middle where voxels are far from cubes; needs 4 bytes a voxel more
+               // the middle where voxels are far from cubes and leaves a tenth of the
+               // twigs; needs 4 bytes more for each foreground voxel and about twice the time
 };
 
 struct ThinningOptions {
@@ -36,8 +38,5 @@ Result<Mask> thin(Mask mask, const ThinningOptions& options = {}, const Progress
 // Time: proportional to the lists, without a pass over the image.
 void rethin(Mask& mask, const std::vector<std::size_t>& voxels,
             const std::vector<std::size_t>& kept, Connectivity connectivity = Connectivity::k26);
-
-// Offsets of all foreground voxels, in growing order. One pass over the image.
-std::vector<std::size_t> foreground_offsets(const Mask& mask);
 
 }  // namespace angiospline

@@ -9,6 +9,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
+#include "recovery/foreground.h"
+
 namespace angiospline {
 namespace {
 
@@ -35,7 +37,8 @@ std::array<std::int8_t, 256> window_parts(Connectivity connectivity) {
 }
 
 bool is_empty(const std::uint8_t* row, int n) {
-  return std::all_of(row, row + n, [](std::uint8_t v) { return v == 0; });
+  const auto count = static_cast<std::size_t>(n);
+  return next_foreground(row, 0, count) == count;
 }
 
 std::int64_t euler_characteristic(const Mask& mask, Connectivity connectivity) {
@@ -114,8 +117,11 @@ class RunPieces {
     const std::uint8_t* row = &mask_.voxels[mask_.grid.offset({0, y, z})];
     const bool rim = y == 0 || z == 0 || y == n[1] - 1 || z == n[2] - 1;
     for (int x = 0; x < n[0];) {
+      if (foreground_)
+        x = static_cast<int>(
+            next_foreground(row, static_cast<std::size_t>(x), static_cast<std::size_t>(n[0])));
       const int begin = x;
-      while (x < n[0] && (row[x] != 0) == foreground_) ++x;
+      x = end_of_run(row, x);
       if (x > begin) {
         runs_.push_back({begin, x, parent_.size()});
         parent_.push_back(parent_.size());
@@ -124,6 +130,15 @@ class RunPieces {
       while (x < n[0] && (row[x] != 0) != foreground_) ++x;
     }
     row_begin_[row_index(y, z) + 1] = runs_.size();
+  }
+
+  int end_of_run(const std::uint8_t* row, int x) const {
+    const int n = mask_.grid.size[0];
+    if (!foreground_)
+      return static_cast<int>(
+          next_foreground(row, static_cast<std::size_t>(x), static_cast<std::size_t>(n)));
+    while (x < n && row[x] != 0) ++x;
+    return x;
   }
 
   void join(int y, int z, int other_y, int other_z) {

@@ -32,7 +32,7 @@ TEST(DistanceTransform, agrees_with_brute_force_for_any_spacing) {
     mask.grid.spacing_mm =
         Vec3(random.uniform(0.2, 3.0), random.uniform(0.2, 3.0), random.uniform(0.2, 3.0));
     mask.voxels[0] = 0;
-    const Image<float> distances = distances_to_background_mm(mask);
+    const Image<float> distances = ForegroundDistances(mask).image();
     for (std::size_t k = 0; k < mask.voxels.size(); ++k)
       ASSERT_NEAR(distances.voxels[k],
                   mask.voxels[k] ? by_brute_force(mask, mask.grid.voxel(k), false) : 0.0, 1e-5);
@@ -68,7 +68,7 @@ TEST(BoundaryDistances, lie_half_a_voxel_before_a_flat_wall) {
 
 TEST(Distances, of_an_image_without_background_go_to_the_outside) {
   Mask mask(test::empty_mask({7, 5, 9}, Vec3(1, 2, 3)).grid, 1);
-  EXPECT_FLOAT_EQ((distances_to_background_mm(mask)[{3, 2, 4}]), 4.0F);
+  EXPECT_FLOAT_EQ((ForegroundDistances(mask).image()[{3, 2, 4}]), 4.0F);
   EXPECT_DOUBLE_EQ(boundary_distances_mm(mask, {mask.grid.offset({3, 2, 4})})[0], 3.5);
 }
 
