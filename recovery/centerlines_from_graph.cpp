@@ -364,7 +364,8 @@ class Centerlines {
     const double longest = 2.5 * radius + 2.0 * voxel_mm();
     Vec3 t = end_direction(points, radius);
     if (t.isZero()) return;
-    for (double gone = 0.0; gone < 2.0 * longest; gone += pace) {
+    const double most = 3.0 * radius + 3.0 * voxel_mm();  // a tail was cut by half of that at most
+    for (double gone = 0.0; gone < most; gone += pace) {
       const Vec3 next = points.back() + pace * t;
       const LumenSection s = lumen_section(mask_, next, t, longest);
       if (!s.closed || s.radius_mm < kFullSection * radius || s.radius_mm * kFullSection > radius)

@@ -21,6 +21,17 @@ double occupancy(const Mask& mask, const Vec3& p) {
   const double a = p[0] - x;
   const double b = p[1] - y;
   const double c = p[2] - z;
+  const Voxel& n = mask.grid.size;
+  if (x >= 0 && y >= 0 && z >= 0 && x + 1 < n[0] && y + 1 < n[1] && z + 1 < n[2]) {
+    const std::size_t dy = static_cast<std::size_t>(n[0]);
+    const std::size_t dz = dy * static_cast<std::size_t>(n[1]);
+    const std::uint8_t* v = mask.voxels.data() + mask.grid.offset({x, y, z});
+    const auto along_x = [a](const std::uint8_t* pair) {
+      return (pair[0] != 0 ? 1.0 - a : 0.0) + (pair[1] != 0 ? a : 0.0);
+    };
+    return (1.0 - c) * ((1.0 - b) * along_x(v) + b * along_x(v + dy)) +
+           c * ((1.0 - b) * along_x(v + dz) + b * along_x(v + dz + dy));
+  }
   double sum = 0.0;
   for (int k = 0; k < 8; ++k) {
     const int i = k & 1;

@@ -130,8 +130,8 @@ TEST(VesselsFromMask, name_the_inlet_given_or_else_the_thickest_end) {
 TEST(VesselsFromMask, give_radii_that_are_positive_and_points_that_meet_their_nodes) {
   Random random(12);
   int branches = 0;
-  for (int i = 0; i < 60; ++i) {
-    const Mask mask = test::blob_mask({24, 24, 24}, random.uniform(0.4, 0.6), random);
+  for (int i = 0; i < 20; ++i) {
+    const Mask mask = test::blob_mask({18, 18, 18}, random.uniform(0.4, 0.6), random);
     const auto v = vessels_from_mask(mask);
     if (!v) continue;
     for (const CenterlineBranch& b : v->tree.branches) {
