@@ -197,7 +197,7 @@ Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const P
   SegmentReport report;
   report.seeds_mm = options.seeds_mm;
   if (options.seeds_mm.empty()) {
-    SeedOptions seed_options;
+    SeedSearchOptions seed_options;
     seed_options.polarity = options.polarity;
     Result<std::vector<Vec3>> seeds = find_seeds(image, seed_options, progress);
     if (!seeds) return fail(seeds.error());

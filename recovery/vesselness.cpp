@@ -125,7 +125,7 @@ Result<Image<float>> vesselness(const Image<float>& image, const VesselnessOptio
   return best;
 }
 
-Result<std::vector<Vec3>> find_seeds(const AnyImage& image, const SeedOptions& options,
+Result<std::vector<Vec3>> find_seeds(const AnyImage& image, const SeedSearchOptions& options,
                                      const Progress& progress) {
   const Image<float> small = reduced(image, options.polarity);
   Result<Image<float>> answer = vesselness(small, {}, progress);

@@ -26,7 +26,7 @@ struct VesselnessOptions {
 Result<Image<float>> vesselness(const Image<float>& image, const VesselnessOptions& options = {},
                                 const Progress& progress = {});
 
-struct SeedOptions {
+struct SeedSearchOptions {
   Polarity polarity = Polarity::kBright;
   int most = 8;  // seeds wanted at most
 };
@@ -36,7 +36,7 @@ struct SeedOptions {
 // connected structure above a quarter of the strongest answer that is at least a tenth as strong in
 // all as the strongest one, the best voxel is a seed. Empty if nothing is tubular (an image of one
 // grey value).
-Result<std::vector<Vec3>> find_seeds(const AnyImage& image, const SeedOptions& options = {},
+Result<std::vector<Vec3>> find_seeds(const AnyImage& image, const SeedSearchOptions& options = {},
                                      const Progress& progress = {});
 
 }  // namespace angiospline

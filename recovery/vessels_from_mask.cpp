@@ -16,6 +16,29 @@ int nearest_node(const VesselGraph& graph, const Vec3& point_mm) {
   return static_cast<int>(nearest - graph.nodes.begin());
 }
 
+Result<PrunedSkeleton> pruned_axis(const Mask& mask, const VesselsOptions& options,
+                                   const Progress& progress) {
+  if (options.skeleton && options.skeleton->grid.size != mask.grid.size) {
+    return fail({ErrorKind::kBadInput,
+                 "skeleton and mask differ in size",
+                 {},
+                 {},
+                 "both must lie on one grid"});
+  }
+  Result<Mask> axis = options.skeleton ? *options.skeleton : thin(mask, options.thinning, progress);
+  if (!axis) return fail(axis.error());
+  const Connectivity connectivity = options.thinning.connectivity;
+  if (options.keep_twigs) {
+    PrunedSkeleton whole;
+    whole.graph = vessel_graph(label_skeleton(*axis, connectivity));
+    whole.skeleton = std::move(*axis);
+    return whole;
+  }
+  PruningOptions pruning = options.pruning;
+  pruning.connectivity = connectivity;
+  return prune_twigs(mask, std::move(*axis), pruning, progress);
+}
+
 }  // namespace
 
 Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& options,
@@ -26,11 +49,7 @@ Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& option
   if (vessels.before.components == 0)
     return fail(
         {ErrorKind::kBadInput, "mask is empty", {}, {}, "at least one voxel must be foreground"});
-  Result<Mask> axis = thin(mask, options.thinning, progress);
-  if (!axis) return fail(axis.error());
-  PruningOptions pruning = options.pruning;
-  pruning.connectivity = connectivity;
-  Result<PrunedSkeleton> pruned = prune_twigs(mask, std::move(*axis), pruning, progress);
+  Result<PrunedSkeleton> pruned = pruned_axis(mask, options, progress);
   if (!pruned) return fail(pruned.error());
   vessels.skeleton = std::move(pruned->skeleton);
   vessels.twigs = pruned->twigs;

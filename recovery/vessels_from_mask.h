@@ -1,6 +1,7 @@
 // From a mask to centerlines in one call: thinning, labels, graph, pruning, radii, smoothing.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "base/progress.h"
@@ -21,6 +22,8 @@ struct VesselsOptions {
   // Where flow enters: the node nearest to each is the root and, if it is an end, the inlet of its
   // component. A component without one takes its thickest end.
   std::vector<Vec3> roots_mm;
+  std::optional<Mask> skeleton;  // an axis of the mask that is taken instead of thinning
+  bool keep_twigs = false;       // nothing is pruned
 };
 
 struct Vessels {
@@ -33,7 +36,8 @@ struct Vessels {
 };
 
 // Everything between a mask and its centerline tree. The mask is used as it is: fill its cavities
-// and holes first. Errors: an empty mask; no branch; stopped on request.
+// and holes first. Errors: an empty mask; no branch; a skeleton
+// on another grid; stopped on request.
 Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& options = {},
                                   const Progress& progress = {});
 

@@ -1,0 +1,120 @@
+#include <filesystem>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "cli/console.h"
+#include "cli/figures.h"
+#include "cli/model_stages.h"
+#include "io/centerline_export.h"
+#include "io/certificate_json.h"
+
+namespace angiospline::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The folder for the results; one that this run made goes away again if nothing came to lie in it.
+class OutputFolder {
+ public:
+  static Result<std::unique_ptr<OutputFolder>> make(const std::string& name) {
+    std::error_code error;
+    const bool made = fs::create_directory(name, error);
+    if (error || !fs::is_directory(name)) {
+      return fail({ErrorKind::kCannotWrite, "cannot make the folder", name, error.message(),
+                   "its parent must exist and be writable"});
+    }
+    return std::unique_ptr<OutputFolder>(new OutputFolder(name, made));
+  }
+  ~OutputFolder() {
+    std::error_code ignored;
+    if (made_ && fs::is_empty(path_, ignored)) fs::remove(path_, ignored);
+  }
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  fs::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  OutputFolder(fs::path path, bool made) : path_(std::move(path)), made_(made) {}
+
+  fs::path path_;
+  bool made_;
+};
+
+struct Recovered {
+  SegmentReport segment;
+  Vessels vessels;
+  Model model;
+};
+
+Result<void> write_stage_files(const OutputFolder& folder, const Mask& mask,
+                               const Vessels& vessels) {
+  auto written = write_image(mask, folder / "mask.nrrd");
+  if (written) written = write_image(vessels.skeleton, folder / "skeleton.nrrd");
+  if (written) written = write_centerline_file(folder / "centerlines.swc", vessels.tree);
+  if (written) written = write_centerline_file(folder / "centerlines.vtp", vessels.tree);
+  return written;
+}
+
+Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder& folder,
+                          const Progress& progress, Stopwatch& watch) {
+  auto segmented = segment_image(arguments.segment, progress, watch);
+  if (!segmented) return fail(segmented.error());
+  VesselsOptions options;
+  if (arguments.root_mm) options.roots_mm.push_back(*arguments.root_mm);
+  auto vessels = vessels_from_mask(segmented->mask, options, progress);
+  if (!vessels) return fail(vessels.error());
+  watch.lap("graph");
+  vessels->tree.source = arguments.segment.image;
+  if (auto written = write_stage_files(folder, segmented->mask, *vessels); !written) {
+    return fail(written.error());
+  }
+  watch.lap("write stages");
+  auto model = seed_model(vessels->tree, {}, progress);
+  if (!model) return fail(model.error());
+  model->name = fs::path(arguments.segment.image).stem().stem().string();
+  const SegmentReport& report = segmented->report;
+  model->assumptions.insert(model->assumptions.begin(), report.choices.begin(),
+                            report.choices.end());
+  model->warnings.insert(model->warnings.begin(), report.warnings.begin(), report.warnings.end());
+  watch.lap("model");
+  return Recovered{std::move(segmented->report), std::move(*vessels), std::move(*model)};
+}
+
+}  // namespace
+
+int run_recover(const RecoverArguments& arguments) {
+  const Console console;
+  Stopwatch watch;
+  const auto folder = OutputFolder::make(arguments.output_folder);
+  if (!folder) return report_error(folder.error());
+  const auto recovered = recover(arguments, **folder, console.progress(), watch);
+  if (!recovered) return report_error(recovered.error());
+
+  std::vector<fs::path> paths;
+  for (const char* name : {"model.json", "model.step", "model.iges", "model.glb", "model.stl"}) {
+    paths.push_back(**folder / name);
+  }
+  const auto certificate = finish_model(recovered->model, paths, "AP242", console, watch);
+  if (!certificate) return report_error(certificate.error());
+
+  std::vector<std::string> files;
+  for (const char* name : {"mask.nrrd", "skeleton.nrrd", "centerlines.swc", "centerlines.vtp"}) {
+    files.push_back((**folder / name).string());
+  }
+  for (const fs::path& path : paths) files.push_back(path.string());
+  if (arguments.json) {
+    Json json = model_json(recovered->model);
+    json["segment"] = segmentation_json(recovered->segment);
+    json["graph"] = graph_json(recovered->vessels.tree);
+    json["seconds"] = seconds_json(watch);
+    json["files"] = files;
+    json["check"] = to_json(*certificate);
+    print_json(json);
+  }
+  return tell_outcome(recovered->model, *certificate, {arguments.output_folder}, console);
+}
+
+}  // namespace angiospline::cli

@@ -1,0 +1,104 @@
+// The subcommands: what each is asked, and the verb that does it. Each returns the exit code.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/vector.h"
+
+namespace angiospline::cli {
+
+// How a centerline file is to be read where it cannot say so itself.
+struct CenterlineArguments {
+  std::string unit;  // mm, cm, m, um, or empty: as the format has it
+  bool radius_is_diameter = false;
+  std::string frame;  // LPS, RAS, or empty: as the format has it
+};
+
+// How a vessel is told from its background.
+struct SegmentArguments {
+  std::string image;
+  std::vector<Vec3> seeds_mm;
+  std::vector<Vec3> seeds_vox;
+  bool dark = false;
+  std::optional<int> neighborhood;   // N
+  std::optional<double> deviations;  // M
+  std::optional<double> background;  // grey values beyond it are never vessel
+  std::optional<double> smoothing_vox;
+  std::optional<std::int64_t> limit;  // voxels examined
+  std::string output;
+  bool json = false;
+};
+
+struct SeedArguments {
+  std::string tree;
+  CenterlineArguments reading;
+  std::vector<std::string> outputs;
+  std::string name;
+  std::string step_schema = "AP242";
+  bool json = false;
+};
+
+struct RecoverArguments {
+  SegmentArguments segment;
+  std::optional<Vec3> root_mm;
+  std::string output_folder;
+  bool json = false;
+};
+
+struct ThinArguments {
+  std::string mask;
+  std::string output;
+  bool json = false;
+};
+
+struct GraphArguments {
+  std::string skeleton;
+  std::string mask;  // empty: `skeleton` is the mask itself and is thinned first
+  std::vector<std::string> outputs;
+  std::optional<Vec3> root_mm;
+  bool keep_twigs = false;
+  bool table = false;
+  bool json = false;
+};
+
+struct CheckArguments {
+  std::string model;
+  bool json = false;
+};
+
+struct CompareArguments {
+  std::string a;
+  std::string b;
+  std::optional<double> tolerance_mm;
+  bool json = false;
+};
+
+struct ConvertArguments {
+  std::string input;
+  std::vector<std::string> outputs;
+  std::string step_schema = "AP242";
+};
+
+struct PhantomArguments {
+  std::string kind;
+  std::string output;
+  std::string truth;
+  std::string truth_tree;
+  std::optional<double> snr;
+  std::uint64_t random_seed = 1;
+};
+
+int run_recover(const RecoverArguments& arguments);
+int run_seed(const SeedArguments& arguments);
+int run_segment(const SegmentArguments& arguments);
+int run_thin(const ThinArguments& arguments);
+int run_graph(const GraphArguments& arguments);
+int run_check(const CheckArguments& arguments);
+int run_compare(const CompareArguments& arguments);
+int run_convert(const ConvertArguments& arguments);
+int run_phantom(const PhantomArguments& arguments);
+
+}  // namespace angiospline::cli

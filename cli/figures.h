@@ -1,0 +1,24 @@
+// The figures that scripts rely on, as JSON; only the commands' source files include this.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "cli/stages.h"
+#include "modeling/model.h"
+
+namespace angiospline::cli {
+
+using Json = nlohmann::ordered_json;
+
+Json to_json(const Vec3& v);
+Json seconds_json(const Stopwatch& watch);
+Json segmentation_json(const SegmentReport& report);
+Json graph_json(const CenterlineTree& tree);
+
+// branches, junctions, loops, failed, assumptions, warnings: what seed and recover share.
+Json model_json(const Model& model);
+
+// One line on standard output.
+void print_json(const Json& json);
+
+}  // namespace angiospline::cli

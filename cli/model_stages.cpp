@@ -1,0 +1,64 @@
+#include "cli/model_stages.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "modeling/solid.h"
+
+namespace angiospline::cli {
+
+Result<CenterlineFileOptions> centerline_options(const CenterlineArguments& arguments) {
+  CenterlineFileOptions options;
+  if (!arguments.unit.empty()) {
+    const auto unit = parse_unit_mm(arguments.unit);
+    if (!unit) return fail(unit.error());
+    options.unit_mm = *unit;
+  }
+  options.radius_is_diameter = arguments.radius_is_diameter;
+  if (arguments.frame == "LPS") options.frame = CoordinateFrame::kLps;
+  if (arguments.frame == "RAS") options.frame = CoordinateFrame::kRas;
+  return options;
+}
+
+StepSchema step_schema(const std::string& name) {
+  return name == "AP214" ? StepSchema::kAp214 : StepSchema::kAp242;
+}
+
+Result<Certificate> finish_model(const Model& model,
+                                 const std::vector<std::filesystem::path>& paths,
+                                 const std::string& schema, const Console& console,
+                                 Stopwatch& watch) {
+  const ExportOptions options{step_schema(schema), {}};
+  if (const auto written = export_model(model, paths, options, console.progress()); !written) {
+    return fail(written.error());
+  }
+  watch.lap("write");
+  const auto solid = make_solid(model.network);
+  if (!solid) return fail(solid.error());
+  auto certificate = certify(*solid, {}, console.progress());
+  watch.lap("check");
+  return certificate;
+}
+
+int tell_outcome(const Model& model, const Certificate& certificate,
+                 const std::vector<std::string>& files, const Console& console) {
+  for (const std::string& text : model.assumptions) console.say("note: " + text);
+  for (const std::string& text : model.warnings) console.warn(text);
+  for (const FailedPart& part : model.failed) {
+    console.say(fmt::format("failed: {}: {}", part.name, part.why));
+  }
+  const bool sound = certificate.closed && certificate.valid && !certificate.self_intersecting;
+  console.say(
+      fmt::format("{} branches, {} patches, {} solid{}: {:.6g} mm3, {}, largest normal angle "
+                  "{:.2g} degrees -> {}",
+                  model.tree.branches.size(), model.network.patches.size(), certificate.solids,
+                  certificate.solids == 1 ? "" : "s", certificate.volume_mm3,
+                  sound                           ? "closed and valid"
+                  : certificate.self_intersecting ? "self-intersecting"
+                  : certificate.closed            ? "closed but not valid"
+                                                  : "not closed",
+                  certificate.max_normal_angle_deg, fmt::join(files, " ")));
+  return model.failed.empty() && sound ? kSuccess : kFailure;
+}
+
+}  // namespace angiospline::cli

@@ -1,0 +1,33 @@
+// From a model to its files, its certificate and its exit code: the end of seed and recover.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/console.h"
+#include "cli/stages.h"
+#include "io/centerline_file.h"
+#include "io/model_export.h"
+#include "modeling/certificate.h"
+#include "modeling/seed_model.h"
+
+namespace angiospline::cli {
+
+Result<CenterlineFileOptions> centerline_options(const CenterlineArguments& arguments);
+
+StepSchema step_schema(const std::string& name);
+
+// Writes the files and measures the model as a solid.
+Result<Certificate> finish_model(const Model& model,
+                                 const std::vector<std::filesystem::path>& paths,
+                                 const std::string& schema, const Console& console,
+                                 Stopwatch& watch);
+
+// Warnings, failed parts and one line of summary on stderr. Exit code 0 only if nothing failed and
+// the solid is closed, valid and free of self-intersection.
+int tell_outcome(const Model& model, const Certificate& certificate,
+                 const std::vector<std::string>& files, const Console& console);
+
+}  // namespace angiospline::cli

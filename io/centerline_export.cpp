@@ -1,0 +1,25 @@
+#include "io/centerline_export.h"
+
+#include "base/atomic_file.h"
+#include "io/csv_centerline.h"
+#include "io/swc_file.h"
+#include "io/vtk_file.h"
+
+namespace angiospline {
+
+Result<void> check_centerline_target(const std::filesystem::path& path) {
+  const std::string suffix = path.extension().string();
+  if (suffix == ".swc" || suffix == ".csv" || suffix == ".vtp") return {};
+  return fail({ErrorKind::kBadInput, "unknown centerline format", path.string(), suffix,
+               "one of .swc .csv .vtp"});
+}
+
+Result<void> write_centerline_file(const std::filesystem::path& path, const CenterlineTree& tree) {
+  if (auto target = check_centerline_target(path); !target) return target;
+  const std::string suffix = path.extension().string();
+  if (suffix == ".swc") return write_file(path, swc_text(tree));
+  if (suffix == ".csv") return write_file(path, csv_text(tree));
+  return write_vtk_centerlines(path, tree);
+}
+
+}  // namespace angiospline

@@ -1,0 +1,53 @@
+// One model, many files: the suffix of each says its format.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "io/step_file.h"
+#include "modeling/model.h"
+#include "modeling/solid.h"
+#include "modeling/tessellation.h"
+
+namespace angiospline {
+
+struct ExportOptions {
+  StepSchema step_schema = StepSchema::kAp242;
+  TessellationOptions tessellation;  // of GLB, STL, VTP and VTU
+};
+
+// The suffixes that export_model writes, for messages: ".json .step ...".
+std::string exported_suffixes();
+
+// Nothing wrong with the target's suffix and folder, or the error that export_model would end with.
+Result<void> check_export_target(const std::filesystem::path& path);
+
+// Writes the model to every path: .json (native), .step .stp, .iges .igs, .brep, .glb, .stl, .vtp,
+// .vtu. The solid and the triangles are made once, and only if a path needs them. Each file appears
+// whole or not at all; targets are checked before the first is written. Errors: those of the
+// writers.
+Result<void> export_model(const Model& model, const std::vector<std::filesystem::path>& paths,
+                          const ExportOptions& options = {}, const Progress& progress = {});
+
+// The same for a solid by anyone, to every format but the native one.
+Result<void> export_solid(const Solid& solid, const std::string& name,
+                          const std::vector<std::filesystem::path>& paths,
+                          const ExportOptions& options = {}, const Progress& progress = {});
+
+// The same for triangles: .glb .stl .vtp .vtu.
+Result<void> export_mesh(const TriangleMesh& mesh, const std::string& name,
+                         const std::vector<std::filesystem::path>& paths);
+
+// What a model file holds: the native file a Model; STEP, IGES and BREP a Solid; STL, VTP and VTU a
+// mesh. Errors: an unknown suffix; those of the readers.
+using AnyModel = std::variant<Model, Solid, TriangleMesh>;
+Result<AnyModel> read_any_model(const std::filesystem::path& path, const Progress& progress = {});
+
+// Its surface as triangles, whatever it is.
+Result<TriangleMesh> triangles_of(const AnyModel& model, const Progress& progress = {});
+
+}  // namespace angiospline
