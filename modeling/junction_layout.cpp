@@ -1,7 +1,9 @@
 #include "modeling/junction_layout.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -55,6 +57,7 @@ double azimuth(const OpeningFrame& frame, const Vec3& x) {
 
 std::vector<OpeningFrame> start_openings(const JunctionTopology& topology,
                                          const JunctionTarget& target,
+                                         const std::vector<Vec3>& poles,
                                          const std::vector<double>& distances) {
   std::vector<OpeningFrame> frames;
   for (std::size_t b = 0; b < topology.sectors.size(); ++b) {
@@ -63,9 +66,7 @@ std::vector<OpeningFrame> start_openings(const JunctionTopology& topology,
     frame.axis = branch.direction;
     frame.center = distances[b] * branch.direction;
     frame.radius = branch.radius;
-    const auto pole = [&](int patch) {
-      return topology.poles[at(topology.patches[at(patch)].from)].direction;
-    };
+    const auto pole = [&](int patch) { return poles[at(topology.patches[at(patch)].from)]; };
     const Vec3 first = pole(topology.sectors[b].front());
     const Vec3 across = first - first.dot(frame.axis) * frame.axis;
     frame.x = across.norm() > 1e-6 ? across.normalized() : frame.axis.unitOrthogonal();
@@ -78,16 +79,67 @@ std::vector<OpeningFrame> start_openings(const JunctionTopology& topology,
   return frames;
 }
 
-// The direction at fraction s of a saddle: the arc of points equally far from both branches.
-Vec3 saddle_direction(const JunctionTopology& topology, const JunctionTarget& target,
-                      const JunctionSaddle& saddle, double s) {
+// Where a saddle crosses between its branches.
+struct Crossing {
+  Vec3 direction;
+  double distance;  // of the crotch of the two cylinders, at most that of the nearer opening
+};
+
+// The crotch of two cylinders lies at the angle beta from a with r_a / sin(beta) = r_b / sin(angle
+// - beta); a saddle that does not pass between its branches crosses in the middle of its Voronoi
+// arc.
+Crossing crossing(const JunctionTopology& topology, const JunctionTarget& target,
+                  const JunctionSaddle& saddle, const std::vector<double>& distances) {
+  const TargetBranch& a = target.branches()[at(saddle.branch_a)];
+  const TargetBranch& b = target.branches()[at(saddle.branch_b)];
   const Vec3& from = topology.poles[at(saddle.from)].direction;
   const Vec3& to = topology.poles[at(saddle.to)].direction;
-  const Vec3 edge = (target.branches()[at(saddle.branch_b)].direction -
-                     target.branches()[at(saddle.branch_a)].direction)
-                        .normalized();
-  const double angle = std::acos(std::clamp(from.dot(to), -1.0, 1.0));
-  return (std::cos(s * angle) * from - std::sin(s * angle) * edge.cross(from)).normalized();
+  const Vec3 edge = (b.direction - a.direction).normalized();
+  const Vec3 side = -edge.cross(from);  // the arc turns from `from` towards it
+  const double arc = std::acos(std::clamp(from.dot(to), -1.0, 1.0));
+  const Vec3 sum = a.direction + b.direction;
+  const double angle = std::acos(std::clamp(a.direction.dot(b.direction), -1.0, 1.0));
+  const double turn = std::atan2(side.dot(sum), from.dot(sum));
+  const double nearest = std::min(distances[at(saddle.branch_a)], distances[at(saddle.branch_b)]);
+  if (sum.norm() > 0.5 && turn > 0 && turn < arc) {
+    const double raw =
+        std::atan2(a.radius * std::sin(angle), b.radius + a.radius * std::cos(angle));
+    const double keep =
+        angle < std::numbers::pi / 2 ? 0.05 : 0.05 + 0.8 * (angle / std::numbers::pi - 0.5);
+    const double beta = std::clamp(raw, keep * angle, (1 - keep) * angle);
+    const Vec3 across = (b.direction - std::cos(angle) * a.direction).normalized();
+    const double distance = (a.radius + b.radius) / (2 * std::sin(angle / 2));
+    return {std::cos(beta) * a.direction + std::sin(beta) * across, std::min(distance, nearest)};
+  }
+  const Vec3 middle = std::cos(arc / 2) * from + std::sin(arc / 2) * side;
+  return {middle, std::min(a.radius, b.radius)};
+}
+
+// A pole starts above the mean of the crossings around it.
+std::vector<Vec3> start_poles(const JunctionTopology& topology, const JunctionTarget& target,
+                              const std::vector<Crossing>& crossings) {
+  std::vector<Vec3> sums(topology.poles.size(), Vec3::Zero());
+  std::vector<double> lifts(topology.poles.size(), 0.0);
+  for (std::size_t s = 0; s < crossings.size(); ++s) {
+    const JunctionSaddle& saddle = topology.saddles[s];
+    for (const int pole : {saddle.from, saddle.to}) {
+      const double count = static_cast<double>(topology.poles[at(pole)].branches.size());
+      sums[at(pole)] += crossings[s].distance * crossings[s].direction / count;
+      lifts[at(pole)] += (target.branches()[at(saddle.branch_a)].radius +
+                          target.branches()[at(saddle.branch_b)].radius) /
+                         (2 * count);
+    }
+  }
+  std::vector<Vec3> directions;
+  for (std::size_t k = 0; k < sums.size(); ++k) {
+    const Vec3& n = topology.poles[k].direction;
+    const double up = n.dot(sums[k]);
+    const Vec3 along = sums[k] - up * n;
+    // A pole on the far side of branches that lean away from it stays there.
+    const double share = std::clamp(1 + 2 * up / lifts[k], 0.0, 1.0);
+    directions.push_back((share * along + std::max(up, lifts[k]) * n).normalized());
+  }
+  return directions;
 }
 
 class Relaxation {
@@ -108,15 +160,22 @@ class Relaxation {
     place_openings();
   }
 
-  void start_from_directions() {
+  // Saddles run from pole to pole through their crossings, all lines between them and the openings
+  // straight, and everything is moved along rays from the centre onto the target.
+  void start(const std::vector<Vec3>& poles, const std::vector<Crossing>& crossings) {
     const int last = grid_.size() - 1;
     for (int p = 0; p < patch_count(); ++p) {
       const JunctionPatch& patch = topology_.patches[at(p)];
       const JunctionSaddle& saddle = topology_.saddles[at(patch.saddle)];
       const bool is_a = saddle.patch_a == p;
+      const Vec3 from = target_.on_ray(poles[at(saddle.from)], longest_);
+      const Vec3 to = target_.on_ray(poles[at(saddle.to)], longest_);
+      const Vec3 middle = target_.on_ray(crossings[at(patch.saddle)].direction, longest_);
       for (int j = 0; j <= last; ++j) {
         const double s = static_cast<double>(is_a ? j : last - j) / last;
-        const Vec3 end = target_.on_ray(saddle_direction(topology_, target_, saddle, s), longest_);
+        const Vec3 on_arc =
+            (1 - s) * (1 - 2 * s) * from + 4 * s * (1 - s) * middle + s * (2 * s - 1) * to;
+        const Vec3 end = target_.on_ray(on_arc.normalized(), longest_);
         const Vec3 start = nodes_.col(grid_.at(p, 0, j));
         for (int i = 1; i <= last; ++i) {
           const double u = static_cast<double>(i) / last;
@@ -145,24 +204,37 @@ class Relaxation {
     }
   }
 
-  void sweep() {
-    for (const int node : movable_) {
-      const Vec3 x = nodes_.col(node);
-      Vec3 sum = Vec3::Zero();
-      double weights = 0;
-      for (int k = first_[at(node)]; k < first_[at(node + 1)]; ++k) {
-        const Vec3 edge = nodes_.col(neighbour_[at(k)]) - x;
-        double weight = edge.squaredNorm();
-        for (int root = 0; root < options_.sqrt_count; ++root) weight = std::sqrt(weight);
-        sum += weight * edge;
-        weights += weight;
+  // Lengths of the quads' sides that the mesh aims at: those of its legs, saddles and openings now,
+  // none shorter than half a radius, so that no patch dwindles.
+  void set_lengths() {
+    const int last = grid_.size() - 1;
+    const auto length = [&](int p, bool along_u, int line) {
+      double sum = 0;
+      for (int k = 0; k < last; ++k) {
+        const int a = along_u ? grid_.at(p, k, line) : grid_.at(p, line, k);
+        const int b = along_u ? grid_.at(p, k + 1, line) : grid_.at(p, line, k + 1);
+        sum += (nodes_.col(b) - nodes_.col(a)).norm();
       }
-      if (!(weights > 0)) continue;
-      const Vec3 normal = normals_.col(node);
-      Vec3 move = sum / weights;
-      move -= normal.dot(move) * normal;
-      step_back(node, x + move);
+      return sum;
+    };
+    for (Quad& quad : quads_) {
+      const JunctionPatch& patch = topology_.patches[at(quad.patch)];
+      const JunctionSaddle& saddle = topology_.saddles[at(patch.saddle)];
+      const double least = 0.5 * std::min(target_.branches()[at(saddle.branch_a)].radius,
+                                          target_.branches()[at(saddle.branch_b)].radius);
+      const double u = (quad.i + 0.5) / last;
+      const double v = (quad.j + 0.5) / last;
+      const double along_u = (1 - v) * std::max(least, length(quad.patch, true, 0)) +
+                             v * std::max(least, length(quad.patch, true, last));
+      const double ridge = std::max(least, length(quad.patch, false, last));
+      const double along_v = (1 - u) * length(quad.patch, false, 0) + u * ridge;
+      quad.length_u = along_u / last;
+      quad.length_v = along_v / last;
     }
+  }
+
+  void sweep(double epsilon) {
+    for (const int node : movable_) improve(node, epsilon);
   }
 
   // Half of the way to where the legs arrive.
@@ -216,33 +288,130 @@ class Relaxation {
     }
   }
 
+  struct Quad {
+    std::array<int, 4> nodes;  // (i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)
+    int patch, i, j;
+    double length_u = 1, length_v = 1;
+  };
+
   void connect() {
-    std::vector<std::pair<int, int>> edges;
     std::vector<char> fixed(at(grid_.count()), 0);
     const int last = grid_.size() - 1;
+    quads_at_.resize(at(grid_.count()));
     for (int p = 0; p < patch_count(); ++p) {
-      for (int i = 0; i <= last; ++i) {
-        for (int j = 0; j <= last; ++j) {
-          const int node = grid_.at(p, i, j);
-          if (i == 0) fixed[at(node)] = 1;
-          if (i < last) edges.emplace_back(node, grid_.at(p, i + 1, j));
-          if (j < last) edges.emplace_back(node, grid_.at(p, i, j + 1));
+      for (int j = 0; j <= last; ++j) fixed[at(grid_.at(p, 0, j))] = 1;
+      for (int i = 0; i < last; ++i) {
+        for (int j = 0; j < last; ++j) {
+          const Quad quad{{grid_.at(p, i, j), grid_.at(p, i + 1, j), grid_.at(p, i + 1, j + 1),
+                           grid_.at(p, i, j + 1)},
+                          p,
+                          i,
+                          j};
+          for (const int node : quad.nodes)
+            quads_at_[at(node)].push_back(static_cast<int>(quads_.size()));
+          quads_.push_back(quad);
         }
       }
     }
-    const std::size_t half = edges.size();
-    for (std::size_t e = 0; e < half; ++e) edges.emplace_back(edges[e].second, edges[e].first);
-    std::sort(edges.begin(), edges.end());
-    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-    first_.assign(at(grid_.count() + 1), 0);
-    for (const auto& [a, b] : edges) {
-      ++first_[at(a + 1)];
-      neighbour_.push_back(b);
-    }
-    for (std::size_t k = 1; k < first_.size(); ++k) first_[k] += first_[k - 1];
     for (int node = 0; node < grid_.count(); ++node) {
       if (!fixed[at(node)]) movable_.push_back(node);
     }
+  }
+
+  // The distortion of the quads around a node, were it at x: at each corner the mean of the squared
+  // sides over their aimed lengths, plus an area term, over the signed area, which is kept from
+  // zero by epsilon (Garanzha et al. 2021, "Foldover-free maps in 50 lines of code").
+  struct Distortion {
+    double value = 0;
+    Vec3 gradient = Vec3::Zero();
+    Mat3 hessian = Mat3::Zero();
+  };
+
+  template <bool kWithDerivatives>
+  Distortion distortion(int node, const Vec3& x, double epsilon) const {
+    static constexpr std::array<std::array<int, 4>, 4> kCorners{
+        {{0, 1, 0, 3}, {0, 1, 1, 2}, {3, 2, 1, 2}, {3, 2, 0, 3}}};
+    Distortion sum;
+    for (const int number : quads_at_[at(node)]) {
+      const Quad& quad = quads_[at(number)];
+      std::array<Vec3, 4> corner;
+      Vec3 normal = Vec3::Zero();
+      int mine = 0;
+      for (std::size_t k = 0; k < 4; ++k) {
+        corner[k] = nodes_.col(quad.nodes[k]);
+        normal += normals_.col(quad.nodes[k]);
+        if (quad.nodes[k] == node) mine = static_cast<int>(k);
+      }
+      corner[at(mine)] = x;
+      normal /= normal.norm() * quad.length_u * quad.length_v;
+      const double per_u = 1 / (quad.length_u * quad.length_u);
+      const double per_v = 1 / (quad.length_v * quad.length_v);
+      for (const auto& [u0, u1, v0, v1] : kCorners) {
+        const int su = (u1 == mine) - (u0 == mine);
+        const int sv = (v1 == mine) - (v0 == mine);
+        if (su == 0 && sv == 0) continue;
+        const Vec3 eu = corner[at(u1)] - corner[at(u0)];
+        const Vec3 ev = corner[at(v1)] - corner[at(v0)];
+        const double area = normal.dot(eu.cross(ev));
+        const double root = std::sqrt(epsilon * epsilon + area * area);
+        const double chi = area > 0 ? (area + root) / 2 : epsilon * epsilon / (root - area) / 2;
+        const double top = (eu.squaredNorm() * per_u + ev.squaredNorm() * per_v) / 2 +
+                           options_.area_weight * (area * area + 1) / 2;
+        sum.value += top / chi;
+        if constexpr (kWithDerivatives) {
+          const double chi1 = (1 + area / root) / 2;
+          const double chi2 = epsilon * epsilon / (2 * root * root * root);
+          const Vec3 d_area = su * ev.cross(normal) + sv * normal.cross(eu);
+          const Vec3 d_sides = su * per_u * eu + sv * per_v * ev;
+          const Vec3 d_top = d_sides + options_.area_weight * area * d_area;
+          sum.gradient += d_top / chi - top * chi1 / (chi * chi) * d_area;
+          const double mixed = -chi1 / (chi * chi);
+          const double square =
+              options_.area_weight / chi + top * (2 * chi1 * chi1 / chi - chi2) / (chi * chi);
+          sum.hessian += square * d_area * d_area.transpose() +
+                         mixed * (d_top * d_area.transpose() + d_area * d_top.transpose());
+          sum.hessian.diagonal().array() += (su * su * per_u + sv * sv * per_v) / chi;
+        }
+      }
+    }
+    return sum;
+  }
+
+  // One Newton step in the tangent plane, shortened until it helps.
+  void improve(int node, double epsilon) {
+    const Vec3 x = nodes_.col(node);
+    const Vec3 n = normals_.col(node);
+    const Distortion now = distortion<true>(node, x, epsilon);
+    Eigen::Matrix<double, 3, 2> plane;
+    plane.col(0) = n.unitOrthogonal();
+    plane.col(1) = n.cross(plane.col(0));
+    const Vec2 g = plane.transpose() * now.gradient;
+    Eigen::Matrix2d H = plane.transpose() * now.hessian * plane;
+    // The least shift that makes H safely positive definite.
+    const double middle = H.trace() / 2;
+    const double apart = std::hypot((H(0, 0) - H(1, 1)) / 2, H(0, 1));
+    const double shift = std::max(0.0, 0.05 * (std::abs(middle) + apart) - (middle - apart));
+    H.diagonal().array() += shift;
+    Vec3 move = -(plane * H.inverse() * g);
+    const double most = 0.5 * shortest_side(node);
+    const double length = move.norm();
+    if (!(length > 0)) return;
+    if (length > most) move *= most / length;
+    for (int attempt = 0; attempt < 4; ++attempt, move /= 3) {
+      if (distortion<false>(node, x + move, epsilon).value < now.value) {
+        step_back(node, x + move);
+        return;
+      }
+    }
+  }
+
+  // Of the aimed lengths around a node.
+  double shortest_side(int node) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const int number : quads_at_[at(node)]) {
+      least = std::min({least, quads_[at(number)].length_u, quads_[at(number)].length_v});
+    }
+    return least;
   }
 
   const JunctionTopology& topology_;
@@ -253,8 +422,8 @@ class Relaxation {
   Points3 nodes_;
   Points3 normals_;
   double longest_;
-  std::vector<int> first_;
-  std::vector<int> neighbour_;
+  std::vector<Quad> quads_;
+  std::vector<std::vector<int>> quads_at_;
   std::vector<int> movable_;
 };
 
@@ -264,17 +433,27 @@ JunctionLayout relaxed_layout(const JunctionTopology& topology, const JunctionTa
                               const std::vector<double>& distances, const LayoutOptions& options) {
   EXPECTS(distances.size() == topology.sectors.size());
   static_assert(kFine == 2 * kCoarse - 1);
+  std::vector<Crossing> crossings;
+  for (const JunctionSaddle& saddle : topology.saddles) {
+    crossings.push_back(crossing(topology, target, saddle, distances));
+  }
+  const std::vector<Vec3> poles = start_poles(topology, target, crossings);
   Relaxation coarse(topology, target, options, kCoarse,
-                    start_openings(topology, target, distances));
-  coarse.start_from_directions();
+                    start_openings(topology, target, poles, distances));
+  coarse.start(poles, crossings);
+  coarse.set_lengths();
+  double epsilon = 0.5;
   for (int k = 0; k < options.coarse_sweeps; ++k) {
-    coarse.sweep();
-    if (k % 6 == 5) coarse.follow_legs();
+    coarse.sweep(epsilon);
+    epsilon = std::max(0.02, 0.85 * epsilon);
+    if (k % 8 == 7) coarse.follow_legs();
+    if (k % 10 == 9) coarse.set_lengths();
   }
   const JunctionLayout start = std::move(coarse).result();
   Relaxation fine(topology, target, options, kFine, start.openings);
   fine.start_from(start);
-  for (int k = 0; k < options.fine_sweeps; ++k) fine.sweep();
+  fine.set_lengths();
+  for (int k = 0; k < options.fine_sweeps; ++k) fine.sweep(0.02);
   return std::move(fine).result();
 }
 

@@ -34,13 +34,16 @@ struct JunctionLayout {
 };
 
 struct LayoutOptions {
-  int sqrt_count = 3;      // edge weights |e|^(2^(1 - sqrt_count)) times |e|^0: 3 gives |e|^(1/4)
-  int coarse_sweeps = 60;  // on 5 x 5 nodes a patch, seams following their legs
-  int fine_sweeps = 30;    // on 9 x 9 nodes
+  int coarse_sweeps = 60;    // on 5 x 5 nodes a patch, seams following their legs
+  int fine_sweeps = 30;      // on 9 x 9 nodes
+  double area_weight = 0.5;  // of even areas against right angles
 };
 
-// Starts from the spherical Voronoi diagram of the directions, then alternates tangential averaging
-// with steps back to the target; poles and saddles find their places. Seams keep between half and
+// Starts from the spherical Voronoi diagram of the directions, moved towards the crotches, then
+// lessens the distortion of the quads node by node in the target's tangent planes; folds of the
+// start come undone, and none arise, because distortion grows without bound towards a fold
+// (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free maps in 50 lines of code,
+// ACM ToG 40, 2021). Poles and saddles find their places. Seams keep between half and
 // twice an equal share of the turn; two sectors are always halves.
 // `distances` are those of the openings from the origin. O(nodes * sweeps * branches).
 JunctionLayout relaxed_layout(const JunctionTopology& topology, const JunctionTarget& target,

@@ -17,20 +17,20 @@
 namespace angiospline {
 namespace {
 
-// One set of choices; blends are relative to the one asked for.
+// One set of choices; blend and growth are relative to those of the plan.
 struct Setting {
   double blend = 1.0;
-  double growth = 0.0;
-  int layout_roots = 3;
+  double growth = 1.0;
+  double area_weight = 0.5;
   double merge_deg = 5.0;
 };
 
-constexpr std::array<Setting, 6> kLadder{{{1.0, 0.0, 3, 5.0},
-                                          {1.0, 0.3, 3, 5.0},
-                                          {1.3, 0.3, 2, 5.0},
-                                          {0.8, 0.0, 2, 10.0},
-                                          {1.3, 0.0, 3, 2.0},
-                                          {0.6, 0.3, 3, 5.0}}};
+constexpr std::array<Setting, 6> kLadder{{{1.0, 1.0, 0.5, 5.0},
+                                          {1.0, 1.0, 0.1, 5.0},
+                                          {0.7, 1.0, 0.5, 10.0},
+                                          {1.3, 1.0, 0.5, 5.0},
+                                          {1.0, 1.0, 2.0, 2.0},
+                                          {0.5, 1.0, 0.2, 5.0}}};
 
 struct Attempt {
   JunctionTopology topology;
@@ -44,9 +44,10 @@ Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
   for (const TargetBranch& b : plan.branches) directions.push_back(b.direction);
   JunctionTopology topology =
       junction_topology(directions, setting.merge_deg * std::numbers::pi / 180);
-  const JunctionTarget target(plan.branches, setting.blend * plan.blend, setting.growth);
+  const JunctionTarget target(plan.branches, setting.blend * plan.blend,
+                              setting.growth * plan.growth);
   LayoutOptions layout_options;
-  layout_options.sqrt_count = setting.layout_roots;
+  layout_options.area_weight = setting.area_weight;
   const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
   SmoothedNet smooth = smooth_junction(topology, target, layout);
   JunctionQuality quality = junction_quality(topology, target, smooth.net);
