@@ -12,6 +12,7 @@
 #include "base/contract.h"
 #include "base/version.h"
 #include "io/palette.h"
+#include "io/part_arrays.h"
 #include "io/text_encoding.h"
 
 namespace angiospline {
@@ -19,68 +20,7 @@ namespace {
 
 using Vec3f = Eigen::Vector3f;
 
-// The points, normals and colours one part needs, numbered for it alone.
-struct PartArrays {
-  std::vector<Vec3f> positions;
-  std::vector<Vec3f> normals;
-  std::vector<Eigen::Vector4f> colours;
-  std::vector<std::uint32_t> indices;
-};
-
 Vec3 turned(const Vec3& v) { return {v.x(), v.z(), -v.y()}; }
-
-Vec3 triangle_normal(const TriangleMesh& mesh, int triangle) {
-  const Vec3 a = mesh.points_mm.col(mesh.triangles(0, triangle));
-  const Vec3 b = mesh.points_mm.col(mesh.triangles(1, triangle));
-  const Vec3 c = mesh.points_mm.col(mesh.triangles(2, triangle));
-  return (b - a).cross(c - a);
-}
-
-// Unit normals for the points of a part: the mesh's on the wall, the plane's on a cap.
-Vec3 corner_normal(const TriangleMesh& mesh, int point, const Vec3& plane, bool wall) {
-  Vec3 n = wall && mesh.normals.cols() > 0 ? Vec3(mesh.normals.col(point)) : plane;
-  if (!(n.squaredNorm() > 0.25)) n = plane;  // a singular point of the surface
-  return n.squaredNorm() > 0 ? Vec3(n.normalized()) : Vec3::UnitZ();
-}
-
-std::vector<PartArrays> arrays_of_parts(const TriangleMesh& mesh, const GlbOptions& options) {
-  std::vector<PartArrays> parts(mesh.parts.size());
-  std::vector<Vec3> planes(mesh.parts.size(), Vec3::Zero());
-  for (int t = 0; t < mesh.triangles.cols(); ++t) {
-    planes[static_cast<std::size_t>(mesh.part_of[static_cast<std::size_t>(t)])] +=
-        triangle_normal(mesh, t);
-  }
-  const ColourScale scale = options.field ? scale_of(*options.field) : ColourScale{};
-  std::vector<std::vector<int>> triangles(mesh.parts.size());
-  for (int t = 0; t < mesh.triangles.cols(); ++t) {
-    triangles[static_cast<std::size_t>(mesh.part_of[static_cast<std::size_t>(t)])].push_back(t);
-  }
-  std::vector<std::uint32_t> number(static_cast<std::size_t>(mesh.points_mm.cols()));
-  std::vector<int> numbered_for(number.size(), -1);
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    const bool wall = is_wall(mesh.parts[p].kind);
-    const Vec3 cap_normal = planes[p].normalized();
-    for (const int t : triangles[p]) {
-      for (int k = 0; k < 3; ++k) {
-        const int point = mesh.triangles(k, t);
-        const auto i = static_cast<std::size_t>(point);
-        if (numbered_for[i] != static_cast<int>(p)) {
-          numbered_for[i] = static_cast<int>(p);
-          number[i] = static_cast<std::uint32_t>(parts[p].positions.size());
-          parts[p].positions.push_back(gltf_from_world(mesh.points_mm.col(point)).cast<float>());
-          const Vec3 plane = wall ? Vec3(triangle_normal(mesh, t).normalized()) : cap_normal;
-          parts[p].normals.push_back(turned(corner_normal(mesh, point, plane, wall)).cast<float>());
-          if (options.field && wall) {
-            const Vec3 rgb = linear_from_srgb(scale.colour(options.field->values[point]));
-            parts[p].colours.emplace_back(rgb.homogeneous().cast<float>());
-          }
-        }
-        parts[p].indices.push_back(number[i]);
-      }
-    }
-  }
-  return parts;
-}
 
 // Collects arrays in one buffer and describes them.
 class BufferBuilder {
@@ -161,31 +101,44 @@ int material_index(tinygltf::Model& model, const std::string& name, const Vec3& 
   return static_cast<int>(model.materials.size()) - 1;
 }
 
-void add_part(tinygltf::Model& model, BufferBuilder& buffer, const MeshPart& part,
-              const PartArrays& arrays) {
+void add_part(tinygltf::Model& model, BufferBuilder& buffer, const TriangleMesh& mesh,
+              std::size_t p, const PartArrays& arrays, const GlbOptions& options) {
+  const MeshPart& part = mesh.parts[p];
+  std::vector<Vec3f> positions;
+  std::vector<Vec3f> normals;
+  for (const int k : arrays.points) {
+    positions.push_back(gltf_from_world(mesh.points_mm.col(k)).cast<float>());
+  }
+  for (const Vec3& n : arrays.normals) normals.push_back(turned(n).cast<float>());
   tinygltf::Primitive primitive;
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
-  primitive.attributes["POSITION"] = buffer.add_positions(arrays.positions);
-  primitive.attributes["NORMAL"] = buffer.add(arrays.normals, TINYGLTF_COMPONENT_TYPE_FLOAT,
+  primitive.attributes["POSITION"] = buffer.add_positions(positions);
+  primitive.attributes["NORMAL"] = buffer.add(normals, TINYGLTF_COMPONENT_TYPE_FLOAT,
                                               TINYGLTF_TYPE_VEC3, TINYGLTF_TARGET_ARRAY_BUFFER);
-  if (!arrays.colours.empty()) {
-    primitive.attributes["COLOR_0"] = buffer.add(arrays.colours, TINYGLTF_COMPONENT_TYPE_FLOAT,
+  if (options.field && is_wall(part.kind)) {
+    const ColourScale scale = scale_of(*options.field);
+    std::vector<Eigen::Vector4f> colours;
+    for (const int k : arrays.points) {
+      const Vec3 rgb = linear_from_srgb(scale.colour(options.field->values[k]));
+      colours.emplace_back(rgb.homogeneous().cast<float>());
+    }
+    primitive.attributes["COLOR_0"] = buffer.add(colours, TINYGLTF_COMPONENT_TYPE_FLOAT,
                                                  TINYGLTF_TYPE_VEC4, TINYGLTF_TARGET_ARRAY_BUFFER);
     primitive.material = material_index(model, "field", Vec3::Ones());
   } else {
-    primitive.material = material_index(model, to_string(part.kind), kind_colour(part.kind));
+    primitive.material = material_index(model, valid_utf8(part.name), part_colour(part));
   }
-  primitive.indices = buffer.add_indices(arrays.indices, arrays.positions.size());
-  tinygltf::Mesh mesh;
-  mesh.name = valid_utf8(part.name);
-  mesh.primitives.push_back(std::move(primitive));
+  primitive.indices = buffer.add_indices(arrays.indices, arrays.points.size());
+  tinygltf::Mesh gltf_mesh;
+  gltf_mesh.name = valid_utf8(part.name);
+  gltf_mesh.primitives.push_back(std::move(primitive));
   tinygltf::Node node;
-  node.name = mesh.name;
+  node.name = gltf_mesh.name;
   node.mesh = static_cast<int>(model.meshes.size());
   node.extras =
       tinygltf::Value(tinygltf::Value::Object{{"kind", tinygltf::Value(to_string(part.kind))},
                                               {"radius_mm", tinygltf::Value(part.radius_mm)}});
-  model.meshes.push_back(std::move(mesh));
+  model.meshes.push_back(std::move(gltf_mesh));
   model.nodes[0].children.push_back(static_cast<int>(model.nodes.size()));
   model.nodes.push_back(std::move(node));
 }
@@ -221,9 +174,9 @@ Result<std::string> mesh_to_glb(const TriangleMesh& mesh, const GlbOptions& opti
   model.defaultScene = 0;
   model.nodes.push_back(root_node(options));
   BufferBuilder buffer(model);
-  const std::vector<PartArrays> parts = arrays_of_parts(mesh, options);
+  const std::vector<PartArrays> parts = arrays_of_parts(mesh);
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    if (!parts[p].indices.empty()) add_part(model, buffer, mesh.parts[p], parts[p]);
+    if (!parts[p].indices.empty()) add_part(model, buffer, mesh, p, parts[p], options);
   }
   if (buffer.size() > std::numeric_limits<std::uint32_t>::max() - (64U << 20U)) {
     return fail({ErrorKind::kFailed, "mesh is too large for one binary glTF file", "glTF",

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "modeling/solid.h"
+
 namespace angiospline {
 namespace {
 
@@ -31,20 +33,19 @@ Vec3 interpolate(const std::array<unsigned, N>& stops, double t) {
 
 }  // namespace
 
-Vec3 kind_colour(PartKind kind) {
-  switch (kind) {
-    case PartKind::kBody:
-      return from_hex(0xc8423b);
-    case PartKind::kJunction:
-      return from_hex(0x9c2f35);
+Vec3 part_colour(const MeshPart& part) {
+  switch (part.kind) {
     case PartKind::kInlet:
-      return from_hex(0x2f9e5b);
+      return face_colour(FaceKind::kInlet, part.name);
     case PartKind::kOutlet:
-      return from_hex(0x2f6fb7);
+      return face_colour(FaceKind::kOutlet, part.name);
     case PartKind::kCap:
+      return face_colour(FaceKind::kCap, part.name);
+    case PartKind::kBody:
+    case PartKind::kJunction:
       break;
   }
-  return from_hex(0x8a8f98);
+  return face_colour(FaceKind::kWall, part.name);
 }
 
 Vec3 sequential_colour(double t) { return interpolate(kViridis, t); }

@@ -1,4 +1,4 @@
-// The colours of pictures: of parts by kind, of numbers by size. sRGB, each channel in [0, 1].
+// The colours of pictures: of parts, and of numbers by size. sRGB, each channel in [0, 1].
 #pragma once
 
 #include <string>
@@ -8,8 +8,9 @@
 
 namespace angiospline {
 
-// Bodies red, junctions darker, inlets green, outlets blue, other caps grey.
-Vec3 kind_colour(PartKind kind);
+// The colour of a part, the same as its face's in the CAD files (modeling/solid.h): inlets red,
+// outlets blue, other caps grey, and for walls a soft hue that depends on the name alone.
+Vec3 part_colour(const MeshPart& part);
 
 // A colour for t in [0, 1] (clamped) on a scale that is read right in grey and by the colour-blind:
 // sequential is viridis; diverging runs from blue over near white at 0.5 to red. NaN is grey.
