@@ -20,9 +20,11 @@ using ArcColumns = std::vector<std::array<int, 6>>;
 
 class Assembler {
  public:
-  SurfaceNetwork run(const std::vector<Junction>& junctions, const std::vector<BodyPiece>& bodies) {
+  SurfaceNetwork run(const std::vector<Junction>& junctions, const std::vector<BodyPiece>& bodies,
+                     const std::vector<ClosedOpening>& closed) {
     for (const Junction& junction : junctions) add_junction(junction);
     for (const BodyPiece& piece : bodies) add_body(junctions, piece);
+    for (const ClosedOpening& opening : closed) close_opening(junctions, opening);
     network_.control_points_mm =
         Eigen::Map<const Points3>(pool_.data()->data(), 3, static_cast<Eigen::Index>(pool_.size()));
     return std::move(network_);
@@ -208,6 +210,17 @@ class Assembler {
     if (link.kind == BodyLink::Kind::kRim) network_.rims.push_back(std::move(rim));
   }
 
+  void close_opening(const std::vector<Junction>& junctions, const ClosedOpening& closed) {
+    const JunctionOpening& opening =
+        junctions[index(closed.junction)].openings[index(closed.opening)];
+    Rim rim{closed.rim_name, closed.rim_kind,   opening.center_mm,
+            opening.axis,    opening.radius_mm, {}};
+    for (const int patch : opening.patches) {
+      rim.sides.push_back({first_patch_[index(closed.junction)] + patch, PatchSide::kU0, 0.0, 1.0});
+    }
+    network_.rims.push_back(std::move(rim));
+  }
+
   // The second body to name an arc of a circle is joined to the first.
   void join_on_circle(int circle, int arc, const Side& side) {
     const auto [at, added] = waiting_.try_emplace({circle, arc}, side);
@@ -240,9 +253,10 @@ BodyEnd opening_end(const Junction& junction, int number, bool leaving) {
 }
 
 SurfaceNetwork assemble(const std::vector<Junction>& junctions,
-                        const std::vector<BodyPiece>& bodies) {
+                        const std::vector<BodyPiece>& bodies,
+                        const std::vector<ClosedOpening>& closed) {
   EXPECTS(!junctions.empty() || !bodies.empty());
-  return Assembler().run(junctions, bodies);
+  return Assembler().run(junctions, bodies, closed);
 }
 
 }  // namespace angiospline

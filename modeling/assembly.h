@@ -32,13 +32,23 @@ struct BodyPiece {
   BodyLink end_link;
 };
 
+// An opening without a body: it is closed by a plane cap of its own.
+struct ClosedOpening {
+  int junction = -1;
+  int opening = -1;
+  std::string rim_name;
+  RimKind rim_kind = RimKind::kCap;
+};
+
 // The end of a body at a junction's opening. `leaving`: the body starts there.
 BodyEnd opening_end(const Junction& junction, int opening, bool leaving);
 
 // The network of all pieces; regions come in the order of junctions, then bodies. Where a strip
 // covers a whole arc of an opening it uses the junction's pool columns; where it covers a part, its
-// columns are Dependencies of them. Linear in the pieces' size.
+// columns are Dependencies of them. Every opening must be named by one body or by one of `closed`.
+// Linear in the pieces' size.
 SurfaceNetwork assemble(const std::vector<Junction>& junctions,
-                        const std::vector<BodyPiece>& bodies);
+                        const std::vector<BodyPiece>& bodies,
+                        const std::vector<ClosedOpening>& closed = {});
 
 }  // namespace angiospline

@@ -85,7 +85,7 @@ class Seeder {
                    {}});
     }
     Model model;
-    model.network = assemble(junctions_, pieces_);
+    model.network = assemble(junctions_, pieces_, closed_);
     model.tree = tree_.tree;
     model.assumptions = tree_.tree.assumptions;
     model.warnings = tree_.warnings;
@@ -159,6 +159,7 @@ class Seeder {
 
   struct Outcome {
     std::vector<BodyPiece> pieces;
+    std::vector<ClosedOpening> closed;
     std::vector<std::string> warnings;
     std::optional<FailedPart> failed;
   };
@@ -176,6 +177,7 @@ class Seeder {
     if (progress_.should_stop()) return false;
     for (Outcome& outcome : outcomes) {
       for (BodyPiece& piece : outcome.pieces) pieces_.push_back(std::move(piece));
+      for (ClosedOpening& closed : outcome.closed) closed_.push_back(std::move(closed));
       for (std::string& text : outcome.warnings) warnings_.push_back(std::move(text));
       if (outcome.failed) failed_.push_back(std::move(*outcome.failed));
     }
@@ -261,8 +263,16 @@ class Seeder {
     const bool capped =
         start.link.kind == BodyLink::Kind::kRim || end.link.kind == BodyLink::Kind::kRim;
     if (capped && end.along - start.along < kShortestPiece * radius) {
-      outcome.failed =
-          FailedPart{"wall_" + branch.name, "nothing of it is left beyond its junctions"};
+      // A free end so near the opening is cut there; of a branch between failed junctions nothing
+      // is left.
+      if (!close_at_opening(start.link, end.link, outcome) &&
+          !close_at_opening(end.link, start.link, outcome)) {
+        outcome.failed =
+            FailedPart{"wall_" + branch.name, "nothing of it is left beyond its junctions"};
+      } else {
+        outcome.warnings.push_back(
+            fmt::format("branch {} ends at the opening of its junction", branch.name));
+      }
       return outcome;
     }
     BodyPiece piece = sweep(followed(branch, start, end), start, end);
@@ -288,6 +298,12 @@ class Seeder {
     piece.name = "wall_" + branch.name;
     outcome.pieces.push_back(std::move(piece));
     return outcome;
+  }
+
+  static bool close_at_opening(const BodyLink& opening, const BodyLink& rim, Outcome& outcome) {
+    if (opening.kind != BodyLink::Kind::kOpening) return false;
+    outcome.closed.push_back({opening.junction, opening.opening, rim.rim_name, rim.rim_kind});
+    return true;
   }
 
   static Eigen::Matrix4Xd straight(const Stop& start, const Stop& end) {
@@ -396,6 +412,7 @@ class Seeder {
   std::vector<char> flow_;
   std::vector<Junction> junctions_;
   std::vector<BodyPiece> pieces_;
+  std::vector<ClosedOpening> closed_;
   std::vector<std::string> warnings_;
   std::vector<FailedPart> failed_;
 };
