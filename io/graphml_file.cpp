@@ -60,6 +60,7 @@ class GraphmlReader {
         keys_[std::string(xml_.attribute("id").value_or(""))] =
             meaning_of(xml_.attribute("attr.name").value_or(""));
       }
+      if (xml_.tag() == "graph") is_directed_ = xml_.attribute("edgedefault") == "directed";
       if (xml_.tag() == "data") taken = graph_data();
       if (xml_.tag() == "node") taken = node();
       if (xml_.tag() == "edge") taken = edge();
@@ -187,6 +188,13 @@ class GraphmlReader {
       if (is_new) graph_.line_names.push_back(e.data.branch);
       graph_.line_of_edge.push_back(e.data.branch.empty() ? -1 : line->second);
     }
+    if (is_directed_) {  // flow enters where no edge does
+      std::vector<bool> entered(graph_.points.size(), false);
+      for (const auto& [from, to] : graph_.edges) entered[index(to)] = true;
+      for (std::size_t p = 0; p < entered.size(); ++p) {
+        if (!entered[p]) graph_.roots.push_back(static_cast<int>(p));
+      }
+    }
     return {};
   }
 
@@ -196,6 +204,7 @@ class GraphmlReader {
   std::map<std::string, int> node_of_;
   std::vector<Edge> edges_;
   int nodes_without_radius_ = 0;
+  bool is_directed_ = false;
   PointGraph graph_;
   FileFacts facts_;
 };

@@ -11,6 +11,7 @@ namespace angiospline {
 
 // Attributes are known by name: x, y, z (pos_x, X ...), radius (r) or diameter at nodes or at
 // edges, branch at edges. Where both nodes and edges have radii the edges' are taken.
+// In a directed graph flow enters at the ends that no edge enters.
 Result<CenterlineTree> parse_graphml(std::string_view text, std::string_view name,
                                      const CenterlineFileOptions& options = {});
 
