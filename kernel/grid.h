@@ -30,10 +30,11 @@ struct SurfaceGrid {
 
 // All partials up to total order `derivatives` at (us[i], vs[j]). The tensor structure is used:
 // basis functions are computed once for each parameter, and u is contracted before v. D is 1 to 4.
-// O(|us| |vs| order_v) after O(|us| v_count order_u).
+// O(|us| |vs| order_v) after O(|us| v_count order_u). `storage`, an earlier grid, gives its memory.
 template <int D>
 SurfaceGrid<D> evaluate_grid(const BSplineSurface<D>& surface, const std::vector<double>& us,
-                             const std::vector<double>& vs, int derivatives = 0);
+                             const std::vector<double>& vs, int derivatives = 0,
+                             SurfaceGrid<D> storage = {});
 
 // The k-th derivative of a curve at every parameter, one column each.
 template <int D>

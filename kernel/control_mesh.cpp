@@ -1,0 +1,199 @@
+#include "kernel/control_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/contract.h"
+#include "kernel/refinement.h"
+#include "kernel/reshape.h"
+
+namespace angiospline {
+namespace {
+
+// Rows of a net as curves side by side: `lines` points of D doubles for each control point.
+struct Lines {
+  const double* points;
+  int lines;
+  int dimension;
+
+  const double* at(int i, int line) const {
+    return points + (static_cast<std::ptrdiff_t>(i) * lines + line) * dimension;
+  }
+};
+
+// For each span (by its index among all knots) the largest distance, over the lines, of a control
+// point alive there from the prolonged legs of the polygon that meet the span.
+std::vector<double> span_distances(const KnotVector& knots, const Lines& net) {
+  const int p = knots.degree();
+  const int n = knots.control_point_count();
+  const std::vector<double> nodes = knots.greville();
+  const auto node = [&](int i) { return nodes[static_cast<std::size_t>(i)]; };
+  std::vector<double> distance(static_cast<std::size_t>(n), 0.0);
+  if (p < 2) return distance;  // the polygon is the curve
+  for (int span = p; span < n; ++span) {
+    if (!(knots[span] < knots[span + 1])) continue;
+    double largest = 0;
+    for (int leg = span - p; leg < span; ++leg) {
+      if (node(leg + 1) <= knots[span] || node(leg) >= knots[span + 1]) continue;
+      const double length = node(leg + 1) - node(leg);
+      if (!(length > 0)) continue;
+      for (int line = 0; line < net.lines; ++line) {
+        const double* a = net.at(leg, line);
+        const double* b = net.at(leg + 1, line);
+        for (int i = span - p; i <= span; ++i) {
+          const double s = (node(i) - node(leg)) / length;
+          const double* c = net.at(i, line);
+          double squared = 0;
+          for (int d = 0; d < net.dimension; ++d) {
+            const double off = c[d] - a[d] - s * (b[d] - a[d]);
+            squared += off * off;
+          }
+          largest = std::max(largest, squared);
+        }
+      }
+    }
+    distance[static_cast<std::size_t>(span)] = std::sqrt(largest);
+  }
+  return distance;
+}
+
+double largest(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+}
+
+// New knots that cut every span above the tolerance into the pieces that quadratic convergence asks
+// for; at most four at a time, so that a far first estimate does not overshoot.
+std::vector<double> cuts(const KnotVector& knots, const std::vector<double>& distance,
+                         double tolerance) {
+  std::vector<double> added;
+  for (int span = knots.degree(); span < knots.control_point_count(); ++span) {
+    const double ratio = distance[static_cast<std::size_t>(span)] / tolerance;
+    if (!(ratio > 1)) continue;
+    const int pieces = std::clamp(static_cast<int>(std::ceil(0.8 * std::sqrt(ratio))), 2, 4);
+    const double from = knots[span];
+    const double to = knots[span + 1];
+    for (int k = 1; k < pieces; ++k) {
+      const double t = from + (to - from) * k / pieces;
+      if (t > from && t < to) added.push_back(t);
+    }
+  }
+  return added;
+}
+
+std::optional<Error> mesh_error(const KnotVector& knots, const MeshOptions& options,
+                                const char* where) {
+  if (!(options.tolerance > 0)) {
+    return Error{ErrorKind::kBadInput, "tolerance is not positive", where,
+                 std::to_string(options.tolerance), "must be above 0"};
+  }
+  for (const double t : knots.breakpoints()) {
+    if (t > knots.first() && t < knots.last() && knots.multiplicity(t) > knots.degree()) {
+      return Error{ErrorKind::kBadInput, "spline may jump", std::string(where) + ", knot",
+                   std::to_string(t), "multiplicity must be at most the degree"};
+    }
+  }
+  return std::nullopt;
+}
+
+Error too_many(Eigen::Index count, int most) {
+  return Error{ErrorKind::kFailed, "tolerance needs too many control points", "control mesh",
+               std::to_string(count), "at most " + std::to_string(most) + " are allowed"};
+}
+
+constexpr int kMostRounds = 64;
+
+}  // namespace
+
+template <int D>
+double control_polygon_distance(const BSplineCurve<D>& curve) {
+  return largest(span_distances(curve.knots(), {curve.control_points().data(), 1, D}));
+}
+
+template <int D>
+double control_mesh_distance(const BSplineSurface<D>& surface) {
+  const BSplineSurface<D> swapped = swap_uv(surface);
+  return largest(
+             span_distances(surface.u(), {surface.control_points().data(), surface.v_count(), D})) +
+         largest(
+             span_distances(surface.v(), {swapped.control_points().data(), surface.u_count(), D}));
+}
+
+template <int D>
+Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
+                                            const MeshOptions& options) {
+  if (auto error = mesh_error(curve.knots(), options, "curve")) return fail(*error);
+  RefinedCurve<D> result{curve, 0};
+  for (int round = 0; round < kMostRounds; ++round) {
+    const BSplineCurve<D>& at = result.curve;
+    const std::vector<double> distance =
+        span_distances(at.knots(), {at.control_points().data(), 1, D});
+    result.distance = largest(distance);
+    const std::vector<double> added = cuts(at.knots(), distance, options.tolerance);
+    if (added.empty()) return result;
+    const Eigen::Index count = at.control_points().cols() + static_cast<Eigen::Index>(added.size());
+    if (count > options.most_control_points) {
+      return fail(too_many(count, options.most_control_points));
+    }
+    Result<BSplineCurve<D>> finer = insert_knots(at, added);
+    if (!finer) return fail(finer.error());
+    result.curve = std::move(*finer);
+  }
+  return fail(too_many(result.curve.control_points().cols(), options.most_control_points));
+}
+
+// The error of a direction falls with the square of its number of spans, so for shares x and 1 - x
+// of the tolerance the count goes like sqrt(a / x) sqrt(b / (1 - x)): least at one half, whatever a
+// and b. A direction that needs less than its half leaves the rest to the other.
+template <int D>
+Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
+                                              const MeshOptions& options) {
+  if (auto error = mesh_error(surface.u(), options, "u direction")) return fail(*error);
+  if (auto error = mesh_error(surface.v(), options, "v direction")) return fail(*error);
+  RefinedSurface<D> result{surface, 0};
+  for (int round = 0; round < kMostRounds; ++round) {
+    const BSplineSurface<D>& at = result.surface;
+    const BSplineSurface<D> swapped = swap_uv(at);
+    const std::vector<double> along_u =
+        span_distances(at.u(), {at.control_points().data(), at.v_count(), D});
+    const std::vector<double> along_v =
+        span_distances(at.v(), {swapped.control_points().data(), at.u_count(), D});
+    const double worst_u = largest(along_u);
+    const double worst_v = largest(along_v);
+    result.distance = worst_u + worst_v;
+    if (result.distance <= options.tolerance) return result;
+    const double half = 0.5 * options.tolerance;
+    const std::vector<double> added_u =
+        cuts(at.u(), along_u, std::max(half, options.tolerance - worst_v));
+    const std::vector<double> added_v =
+        cuts(at.v(), along_v, std::max(half, options.tolerance - worst_u));
+    const Eigen::Index count = (at.u_count() + static_cast<Eigen::Index>(added_u.size())) *
+                               (at.v_count() + static_cast<Eigen::Index>(added_v.size()));
+    if (count > options.most_control_points) {
+      return fail(too_many(count, options.most_control_points));
+    }
+    const Result<KnotVector> u = with_knots(at.u(), added_u);
+    const Result<KnotVector> v = with_knots(at.v(), added_v);
+    if (!u) return fail(u.error());
+    if (!v) return fail(v.error());
+    result.surface = refine(at, *u, *v);
+  }
+  return fail(too_many(result.surface.control_points().cols(), options.most_control_points));
+}
+
+#define ANGIOSPLINE_INSTANTIATE(D)                                                 \
+  template double control_polygon_distance(const BSplineCurve<D>&);                \
+  template double control_mesh_distance(const BSplineSurface<D>&);                 \
+  template Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>&,     \
+                                                       const MeshOptions&);        \
+  template Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>&, \
+                                                         const MeshOptions&);
+ANGIOSPLINE_INSTANTIATE(1)
+ANGIOSPLINE_INSTANTIATE(2)
+ANGIOSPLINE_INSTANTIATE(3)
+ANGIOSPLINE_INSTANTIATE(4)
+#undef ANGIOSPLINE_INSTANTIATE
+
+}  // namespace angiospline
