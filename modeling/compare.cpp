@@ -24,9 +24,12 @@ struct Share {
   double sum_squared = 0.0;  // of squared distance times area
   double squared_max = -1.0;
   Vec3 worst = Vec3::Zero();
+  int near = -1;  // the other surface's triangle nearest to the sample before
 
   void look(const TriangleTree& tree, const Vec3& p, double weight) {
-    const double squared = tree.nearest(p).squared_distance_mm2;
+    const NearestPoint found = tree.nearest(p, near);
+    near = found.triangle;
+    const double squared = found.squared_distance_mm2;
     sum += weight * std::sqrt(squared);
     sum_squared += weight * squared;
     if (squared > squared_max) {

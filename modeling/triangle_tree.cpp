@@ -109,9 +109,18 @@ void TriangleTree::fit_box(Node& node) const {
   }
 }
 
-NearestPoint TriangleTree::nearest(const Vec3& p) const {
+void TriangleTree::look_at(int triangle, const Vec3& p, NearestPoint& best) const {
+  const Vec3 q = nearest_on_triangle(p, mesh_.points_mm.col(mesh_.triangles(0, triangle)),
+                                     mesh_.points_mm.col(mesh_.triangles(1, triangle)),
+                                     mesh_.points_mm.col(mesh_.triangles(2, triangle)));
+  const double squared = (q - p).squaredNorm();
+  if (squared < best.squared_distance_mm2) best = {q, triangle, squared};
+}
+
+NearestPoint TriangleTree::nearest(const Vec3& p, int hint) const {
   NearestPoint best;
   best.squared_distance_mm2 = std::numeric_limits<double>::infinity();
+  if (hint >= 0) look_at(hint, p, best);
   // Halving leaves at most 32 levels, and each adds one node to the stack.
   struct Entry {
     int node;
@@ -126,12 +135,7 @@ NearestPoint TriangleTree::nearest(const Vec3& p) const {
     const Node& node = nodes_[static_cast<std::size_t>(entry.node)];
     if (node.left < 0) {
       for (int k = node.first; k < node.last; ++k) {
-        const int t = order_[static_cast<std::size_t>(k)];
-        const Vec3 q = nearest_on_triangle(p, mesh_.points_mm.col(mesh_.triangles(0, t)),
-                                           mesh_.points_mm.col(mesh_.triangles(1, t)),
-                                           mesh_.points_mm.col(mesh_.triangles(2, t)));
-        const double squared = (q - p).squaredNorm();
-        if (squared < best.squared_distance_mm2) best = {q, t, squared};
+        look_at(order_[static_cast<std::size_t>(k)], p, best);
       }
       continue;
     }

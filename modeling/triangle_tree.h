@@ -25,8 +25,9 @@ class TriangleTree {
   // Requires a sound mesh with at least one triangle.
   explicit TriangleTree(const TriangleMesh& mesh);
 
-  // The nearest point of the mesh; of several at one distance, one that is always the same.
-  NearestPoint nearest(const Vec3& p) const;
+  // The nearest point of the mesh; of several at one distance, one that is always the same for the
+  // same hint. `hint`, a triangle that may be near, saves time.
+  NearestPoint nearest(const Vec3& p, int hint = -1) const;
 
  private:
   // A node covers order_[first .. last); its children, if any, are at `left` and `left` + 1.
@@ -38,6 +39,7 @@ class TriangleTree {
     int left;
   };
 
+  void look_at(int triangle, const Vec3& p, NearestPoint& best) const;
   void split(int node, const Points3& centers);
   void fit_box(Node& node) const;
 

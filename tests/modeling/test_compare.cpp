@@ -60,6 +60,7 @@ TEST(TriangleTree, AgreesWithBruteForce) {
       brute = std::min(brute, (q - p).squaredNorm());
     }
     EXPECT_EQ(tree.nearest(p).squared_distance_mm2, brute);
+    EXPECT_EQ(tree.nearest(p, round).squared_distance_mm2, brute);
   }
 }
 
@@ -74,9 +75,9 @@ TEST(Compare, ASurfaceEqualsItself) {
 }
 
 TEST(Compare, ConcentricTubesAreAsFarApartAsTheirRadii) {
-  const TriangleMesh thin = mesh_of(samples::tube(1.0, 20), 0.0002);
-  const TriangleMesh wide = mesh_of(samples::tube(1.1, 20), 0.0002);
-  const auto c = compare(thin, wide);
+  const TriangleMesh thin = mesh_of(samples::tube(1.0, 20), 0.0005);
+  const TriangleMesh wide = mesh_of(samples::tube(1.1, 20), 0.0005);
+  const auto c = compare(thin, wide, {.spacing_mm = 0.2});
   ASSERT_TRUE(c);
   EXPECT_NEAR(c->a_to_b.max_mm, 0.1, 1e-3);  // the caps lie in each other's planes
   EXPECT_NEAR(c->b_to_a.max_mm, 0.1, 1e-3);
