@@ -44,9 +44,11 @@ json to_json(const Certificate& c) {
       c.max_curvature_times_radius ? json(*c.max_curvature_times_radius) : json();
   result["max_curvature_face"] = optional_text(c.max_curvature_face);
   result["genus"] = c.genus ? json(*c.genus) : json();
-  result["self_intersection"] = c.self_intersecting ? json{{"faces", c.self_intersection},
-                                                           {"at_mm", point(c.self_intersection_mm)}}
-                                                    : json();
+  result["self_intersections"] = json::array();
+  for (const FaceCrossing& crossing : c.self_intersections) {
+    result["self_intersections"].push_back(
+        {{"faces", crossing.faces}, {"at_mm", point(crossing.at_mm)}});
+  }
   result["self_intersection_resolution_mm"] = c.self_intersection_resolution_mm;
   result["edge_samples"] = c.edge_samples;
   result["warnings"] = c.warnings;
@@ -62,12 +64,11 @@ std::string to_text(const Certificate& c) {
   line("solids", fmt::format("{}", c.solids));
   line("closed", yes(c.closed));
   line("valid", yes(c.valid));
-  line("self-intersecting",
-       c.self_intersecting
-           ? fmt::format("yes, {} and {} at ({:.4g}, {:.4g}, {:.4g}) mm", c.self_intersection[0],
-                         c.self_intersection[1], c.self_intersection_mm.x(),
-                         c.self_intersection_mm.y(), c.self_intersection_mm.z())
-           : "no");
+  line("self-intersecting", c.self_intersecting ? "yes" : "no");
+  for (const FaceCrossing& x : c.self_intersections) {
+    line("  crossing", fmt::format("{} and {} at ({:.4g}, {:.4g}, {:.4g}) mm", x.faces[0],
+                                   x.faces[1], x.at_mm.x(), x.at_mm.y(), x.at_mm.z()));
+  }
   line("volume", fmt::format("{:.9g} mm3", c.volume_mm3));
   line("area", fmt::format("{:.9g} mm2", c.area_mm2));
   line("bounding box", fmt::format("({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}) mm",

@@ -13,7 +13,7 @@ namespace angiospline {
 // highest], faces [{name, kind, area_mm2}], smooth_edges, free_edges, max_gap_mm,
 // max_normal_angle_deg, worst_edge [name, name] (null without a smooth edge), worst_edge_at_mm,
 // min_jacobian_ratio, min_jacobian_face, max_curvature_times_radius and max_curvature_face (null
-// where no radius is known), genus (null unless closed), self_intersection {faces, at_mm} or null,
+// where no radius is known), genus (null unless closed), self_intersections [{faces, at_mm}],
 // self_intersection_resolution_mm, edge_samples, warnings.
 nlohmann::json to_json(const Certificate& certificate);
 

@@ -115,12 +115,11 @@ Result<Certificate> measure(const BoundaryModel& model, const CertificateOptions
   certificate.valid = model.is_sound && model.solids > 0 && certificate.closed && positive;
 
   if (options.find_self_intersections) {
-    Result<SelfIntersection> found =
-        find_self_intersection(model, options.most_triangles, progress);
+    Result<SelfIntersections> found =
+        find_self_intersections(model, options.most_triangles, progress);
     if (!found) return fail(found.error());
-    certificate.self_intersecting = found->found;
-    certificate.self_intersection = found->faces;
-    certificate.self_intersection_mm = found->place_mm;
+    certificate.self_intersecting = !found->crossings.empty();
+    certificate.self_intersections = std::move(found->crossings);
     certificate.self_intersection_resolution_mm = found->resolution_mm;
   }
   progress.at("measure", 1.0);

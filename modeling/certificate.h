@@ -26,6 +26,12 @@ struct FaceCertificate {
   double area_mm2 = 0.0;
 };
 
+// Two faces that meet where they should not; the same twice for a face with itself.
+struct FaceCrossing {
+  std::array<std::string, 2> faces;
+  Vec3 at_mm = Vec3::Zero();
+};
+
 // Figures of a solid, or of whatever surfaces a file holds. "Smooth edges" are those that two wall
 // faces share; the rims of caps are not among them.
 struct Certificate {
@@ -49,8 +55,7 @@ struct Certificate {
   std::optional<double> max_curvature_times_radius;  // where faces know their vessel's radius
   std::string max_curvature_face;
   std::optional<int> genus;  // handles of all closed shells together; none if the surface is open
-  std::array<std::string, 2> self_intersection;  // the faces that meet; empty if none do
-  Vec3 self_intersection_mm = Vec3::Zero();
+  std::vector<FaceCrossing> self_intersections;  // one for each pair of names
   double self_intersection_resolution_mm = 0.0;  // overlaps thinner than this may be missed
   int edge_samples = 0;                          // points at which gaps and angles were taken
   std::vector<std::string> warnings;

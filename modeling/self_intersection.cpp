@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
+
+#include <tbb/parallel_for.h>
 
 #include "modeling/boundary_mesh.h"
 #include "modeling/triangle_crossing.h"
@@ -42,8 +45,9 @@ bool has_free_edges(const BoundaryModel& model) {
 
 }  // namespace
 
-Result<SelfIntersection> find_self_intersection(const BoundaryModel& model, int most_triangles,
-                                                const Progress& progress) {
+Result<SelfIntersections> find_self_intersections(const BoundaryModel& model, int most_triangles,
+                                                  const Progress& progress) {
+  const auto stopped = [] { return fail(cancelled("find self-intersections")); };
   progress.at("find self-intersections", 0.4);
   BoundaryMeshOptions options;
   const auto expected = static_cast<double>(expected_triangles(model, options));
@@ -51,29 +55,33 @@ Result<SelfIntersection> find_self_intersection(const BoundaryModel& model, int 
   std::vector<int> faces(model.faces.size());
   std::iota(faces.begin(), faces.end(), 0);
 
-  SelfIntersection result;
-  for (const int f : faces) {
-    result.resolution_mm = std::max(result.resolution_mm, chord_height_mm(model, f, options));
-  }
-  if (progress.should_stop()) return fail(cancelled("find self-intersections"));
+  SelfIntersections result;
+  std::vector<double> heights(faces.size(), 0.0);
+  tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t f) {
+    if (!progress.should_stop()) heights[f] = chord_height_mm(model, faces[f], options);
+  });
+  for (const double h : heights) result.resolution_mm = std::max(result.resolution_mm, h);
+  if (progress.should_stop()) return stopped();
   const BoundaryMesh mesh = mesh_boundary(model, faces, options);
-  if (progress.should_stop()) return fail(cancelled("find self-intersections"));
+  if (progress.should_stop()) return stopped();
   const std::vector<TriangleCrossing> crossings =
       crossing_triangles(mesh.points, mesh.triangles, mesh.face_of, progress);
   const bool is_open = has_free_edges(model);
+  std::set<std::array<std::string, 2>> named;
   for (const TriangleCrossing& crossing : crossings) {
+    if (progress.should_stop()) return stopped();
     if (is_open && crossing.groups[0] != crossing.groups[1]) continue;
-    if (progress.should_stop()) return fail(cancelled("find self-intersections"));
+    FaceCrossing found;
+    for (const std::size_t k : {0U, 1U})
+      found.faces[k] = model.faces[index(crossing.groups[k])].name;
+    if (named.contains(found.faces)) continue;
     if (const auto place = confirmed(model, crossing, options)) {
-      result.found = true;
-      result.place_mm = *place;
-      for (const std::size_t k : {0U, 1U}) {
-        result.faces[k] = model.faces[index(crossing.groups[k])].name;
-      }
-      break;
+      found.at_mm = *place;
+      named.insert(found.faces);
+      result.crossings.push_back(std::move(found));
     }
   }
-  if (progress.should_stop()) return fail(cancelled("find self-intersections"));
+  if (progress.should_stop()) return stopped();
   return result;
 }
 

@@ -1,20 +1,18 @@
 // Whether a surface meets itself where it should not.
 #pragma once
 
-#include <array>
-#include <string>
+#include <vector>
 
 #include "base/progress.h"
 #include "base/result.h"
 #include "modeling/boundary_model.h"
+#include "modeling/certificate.h"
 
 namespace angiospline {
 
-struct SelfIntersection {
-  bool found = false;
-  std::array<std::string, 2> faces;  // the faces that meet; the same twice for a face with itself
-  Vec3 place_mm = Vec3::Zero();
-  double resolution_mm = 0.0;  // largest distance between the triangles and the surface
+struct SelfIntersections {
+  std::vector<FaceCrossing> crossings;  // one for each pair of names, in order of the faces
+  double resolution_mm = 0.0;           // largest distance between the triangles and the surface
 };
 
 // Searches a mesh of the surface, whose faces share the points of their edges, for triangles that
@@ -23,7 +21,7 @@ struct SelfIntersection {
 // On a surface with free edges only
 // crossings of a face with itself count: loose neighbours touch all along their edges.
 // O(n log n) in the triangles. Errors: stopped on request.
-Result<SelfIntersection> find_self_intersection(const BoundaryModel& model, int most_triangles,
-                                                const Progress& progress = {});
+Result<SelfIntersections> find_self_intersections(const BoundaryModel& model, int most_triangles,
+                                                  const Progress& progress = {});
 
 }  // namespace angiospline

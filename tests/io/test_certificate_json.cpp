@@ -39,7 +39,7 @@ TEST(CertificateJson, HasNullForWhatIsNotThere) {
   EXPECT_TRUE(json["worst_edge"].is_null());
   EXPECT_TRUE(json["genus"].is_null());
   EXPECT_TRUE(json["max_curvature_times_radius"].is_null());
-  EXPECT_TRUE(json["self_intersection"].is_null());
+  EXPECT_EQ(json["self_intersections"], nlohmann::json::array());
 }
 
 TEST(CertificateJson, SaysTheSameInWords) {
