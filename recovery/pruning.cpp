@@ -143,19 +143,25 @@ class Pruner {
     const double voxel = options_.voxels * grid.spacing_mm.maxCoeff();
     const Voxel& end = end_voxel(b);
     // A branch whose end alone reaches far enough need not be looked at voxel by voxel.
-    if ((grid.world_mm(end) - center).norm() - lumen > options_.radii * b.radius_mm + voxel) return;
+    const double most = std::max(options_.radii, options_.corner_radii);
+    if ((grid.world_mm(end) - center).norm() - lumen > most * b.radius_mm + voxel) return;
     double reach = 0.0;
     double radius = 0.0;
-    bool leaves = false;
+    double sum = 0.0;
+    int outside = 0;
     for (const Voxel& v : b.voxels) {
       const double r = radii_.at_mm(v);
       const double distance = (grid.world_mm(v) - center).norm();
       reach = std::max(reach, distance + r - lumen);
       if (distance <= lumen) continue;
-      leaves = true;
+      ++outside;
+      sum += r;
       radius = std::max(radius, r);
     }
-    if (leaves && reach >= options_.radii * radius + voxel) return;
+    const bool is_short = reach < options_.radii * radius + voxel;
+    const bool is_corner = sum < options_.corner_fullness * radius * outside &&
+                           reach < options_.corner_radii * radius + voxel;
+    if (outside > 0 && !is_short && !is_corner) return;
     waiting_.insert({reach, grid.offset(end), number});
   }
 

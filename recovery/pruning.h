@@ -14,10 +14,15 @@ namespace angiospline {
 // boundary within the junction, and r that within the part of the branch farther than R from the
 // junction. The branch's lumen reaches beyond its parent's by
 //   reach = max over its voxels v of (|v - junction| + distance of v to the boundary) - R.
-// It is a twig if it has no such part, or if reach < radii * r + voxels * (largest spacing).
+// It is a twig if it has no such part, or if reach < radii * r + voxels * (largest spacing). It is
+// the corner of an end that was cut flat or obliquely if the mean distance over that part is less
+// than corner_fullness * r (a vessel keeps its width, a corner is a wedge with one half) and reach
+// < corner_radii * r + voxels * (largest spacing).
 struct PruningOptions {
   double radii = 1.5;   // a bump as wide as high is a twig; a stump longer than its width is not
   double voxels = 2.0;  // what a mask's staircase can raise
+  double corner_fullness = 0.6;
+  double corner_radii = 4.0;
   Connectivity connectivity = Connectivity::k26;
 };
 

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "recovery/junction_merging.h"
+
 namespace angiospline {
 namespace {
 
@@ -54,12 +56,14 @@ Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& option
   vessels.skeleton = std::move(pruned->skeleton);
   vessels.twigs = pruned->twigs;
   vessels.after = topology_numbers(vessels.skeleton, connectivity);
+  const VesselGraph graph = merge_close_junctions(pruned->graph, mask, options.merge_radii);
+  vessels.merged = static_cast<int>(pruned->graph.nodes.size() - graph.nodes.size());
+  for (const VesselNode& node : graph.nodes) vessels.hidden_cycles += node.cluster_cycles;
   std::vector<int> roots;
-  for (const Vec3& root : options.roots_mm) roots.push_back(nearest_node(pruned->graph, root));
+  for (const Vec3& root : options.roots_mm) roots.push_back(nearest_node(graph, root));
   const std::size_t given = roots.size();
-  for (const int n : thickest_ends(pruned->graph, mask)) roots.push_back(n);
-  vessels.graph =
-      rooted_at(pruned->graph, roots);  // the first root in a component rules: the given one
+  for (const int n : thickest_ends(graph, mask)) roots.push_back(n);
+  vessels.graph = rooted_at(graph, roots);  // the first root in a component rules: the given one
   Result<CenterlineTree> tree =
       centerlines_from_graph(vessels.graph, mask, options.centerlines, progress);
   if (!tree) return fail(tree.error());
@@ -69,6 +73,10 @@ Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& option
         fmt::format("inlet {}: {}", vessels.tree.nodes[static_cast<std::size_t>(inlet)].name,
                     given > 0 ? "nearest to a given root, or else the thickest end"
                               : "the thickest end, since no root was given"));
+  if (vessels.hidden_cycles > 0)
+    vessels.tree.assumptions.push_back(
+        fmt::format("{} tunnels of the mask are no wider than a junction and no loops of the tree",
+                    vessels.hidden_cycles));
   return vessels;
 }
 

@@ -17,7 +17,8 @@ namespace angiospline {
 
 struct VesselsOptions {
   ThinningOptions thinning{Connectivity::k26, ThinningOrder::kDistance};  // fewest twigs
-  PruningOptions pruning;  // its connectivity is that of the thinning
+  PruningOptions pruning;    // its connectivity is that of the thinning
+  double merge_radii = 1.0;  // junctions nearer to each other than so many radii are one; 0: never
   CenterlineOptions centerlines;
   // Where flow enters: the node nearest to each is the root and, if it is an end, the inlet of its
   // component. A component without one takes its thickest end.
@@ -31,6 +32,8 @@ struct Vessels {
   VesselGraph graph;       // rooted at the inlets
   CenterlineTree tree;     // nodes and branches in the graph's order, without lonely voxels
   int twigs = 0;           // branches pruned
+  int merged = 0;          // junctions that became part of a neighbour
+  int hidden_cycles = 0;   // tunnels within junctions, too small to be loops of the tree
   TopologyNumbers before;  // of the mask
   TopologyNumbers after;   // of the skeleton: components, cavities and cycles are the same
 };
