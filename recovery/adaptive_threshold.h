@@ -1,0 +1,305 @@
+// The rule of region growing for one image: its labels, and whether a voxel is vessel (thesis 4.1).
+// Not installed; shared by growing in one image and in several.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/result.h"
+#include "recovery/image.h"
+#include "recovery/region_growing.h"
+
+namespace angiospline::region_growing {
+
+constexpr int kMaxNeighbourhood = 15;
+
+// One bit a voxel, rows padded to whole words, so that the labels of a row of a neighbourhood come
+// with one or two loads.
+class BitVolume {
+ public:
+  explicit BitVolume(const Voxel& size)
+      : words_per_row_((static_cast<std::size_t>(size[0]) + 63) / 64 + 1),
+        rows_(static_cast<std::size_t>(size[1])),
+        words_(words_per_row_ * rows_ * static_cast<std::size_t>(size[2])) {}
+
+  bool test(int x, int y, int z) const { return (word(x, y, z) >> (x & 63)) & 1U; }
+  void set(int x, int y, int z) {
+    words_[row(y, z) + static_cast<std::size_t>(x >> 6)] |= std::uint64_t{1} << (x & 63);
+  }
+  // Bits of `count` voxels from x on, the first in bit 0; count <= 32.
+  std::uint32_t run(int x, int y, int z, int count) const {
+    const std::size_t w = row(y, z) + static_cast<std::size_t>(x >> 6);
+    const int shift = x & 63;
+    std::uint64_t bits = words_[w] >> shift;
+    if (shift + count > 64) bits |= words_[w + 1] << (64 - shift);
+    return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << count) - 1));
+  }
+
+ private:
+  std::size_t row(int y, int z) const {
+    return words_per_row_ * (static_cast<std::size_t>(y) + rows_ * static_cast<std::size_t>(z));
+  }
+  std::uint64_t word(int x, int y, int z) const {
+    return words_[row(y, z) + static_cast<std::size_t>(x >> 6)];
+  }
+
+  std::size_t words_per_row_;
+  std::size_t rows_;
+  std::vector<std::uint64_t> words_;
+};
+
+struct Box {
+  Voxel low, high;  // both inside the image
+};
+
+template <typename F>
+void for_each(const Box& box, F&& f) {
+  for (int z = box.low[2]; z <= box.high[2]; ++z)
+    for (int y = box.low[1]; y <= box.high[1]; ++y)
+      for (int x = box.low[0]; x <= box.high[0]; ++x) f(Voxel{x, y, z});
+}
+
+// The cube of edge 2 half + 1 around c, as far as it lies in the image.
+inline Box box_around(const Voxel& c, int half, const Voxel& size) {
+  Box box;
+  for (std::size_t i = 0; i < 3; ++i) {
+    box.low[i] = std::max(0, c[i] - half);
+    box.high[i] = std::min(size[i] - 1, c[i] + half);
+  }
+  return box;
+}
+
+inline Voxel nearest_voxel(const Vec3& index_vox) {
+  return {static_cast<int>(std::lround(index_vox[0])), static_cast<int>(std::lround(index_vox[1])),
+          static_cast<int>(std::lround(index_vox[2]))};
+}
+
+// Mean and standard deviation from sums about a reference value, so that equal values give exactly
+// zero deviation.
+struct Moments {
+  std::size_t count = 0;
+  double sum = 0, sum_of_squares = 0;
+
+  void add(double difference) {
+    ++count;
+    sum += difference;
+    sum_of_squares += difference * difference;
+  }
+  double mean() const { return sum / static_cast<double>(count); }
+  double deviation() const {
+    const double m = mean();
+    return std::sqrt(std::max(0.0, sum_of_squares / static_cast<double>(count) - m * m));
+  }
+};
+
+struct Decision {
+  bool vessel;
+  double threshold;  // grey value with vessels bright
+};
+
+// Error for options that no growing can use.
+Result<void> check(const GrowOptions& options);
+
+template <typename T>
+class AdaptiveThreshold {
+ public:
+  // Keeps references to both; the image's values may change between calls.
+  AdaptiveThreshold(const Image<T>& image, const GrowOptions& options)
+      : image_(image),
+        options_(options),
+        size_(image.grid.size),
+        sign_(options.polarity == Polarity::kBright ? 1.0 : -1.0),
+        floor_(options.background ? sign_ * *options.background
+                                  : -std::numeric_limits<double>::infinity()),
+        half_(options.neighbourhood_vox / 2),
+        vessel_(size_),
+        background_(size_) {}
+
+  double sign() const { return sign_; }
+  double floor() const { return floor_; }
+
+  // Grey value with vessels bright; not-a-number counts as darker than anything.
+  double grey(const Voxel& v) const {
+    const double value = static_cast<double>(image_[v]);
+    if constexpr (std::is_floating_point_v<T>)
+      if (!std::isfinite(value)) return -std::numeric_limits<double>::infinity();
+    return sign_ * value;
+  }
+  bool admissible(double g) const { return g >= floor_ && std::isfinite(g); }
+
+  bool is_vessel(const Voxel& v) const { return vessel_.test(v[0], v[1], v[2]); }
+  void label_vessel(const Voxel& v) { vessel_.set(v[0], v[1], v[2]); }
+  void label_background(const Voxel& v) { background_.set(v[0], v[1], v[2]); }
+
+  Decision decide(const Voxel& v) const;
+
+  // Where growing starts near a clicked point, and the voxels of S1 there; they are not labelled
+  // yet.
+  struct Start {
+    Voxel seed;
+    std::vector<Voxel> voxels;
+  };
+  Result<Start> start(const Vec3& seed_mm, std::size_t index) const;
+
+ private:
+  Voxel brightest_near(const Voxel& v) const;
+  Moments labelled_around(const Box& box, double reference) const;
+  double mean_of_brightest_connected(const Voxel& c, const Box& box) const;
+
+  const Image<T>& image_;
+  const GrowOptions& options_;
+  Voxel size_;
+  double sign_;
+  double floor_;
+  int half_;
+  BitVolume vessel_;
+  BitVolume background_;  // compared and found dark; a later label of vessel overrules it
+};
+
+template <typename T>
+Voxel AdaptiveThreshold<T>::brightest_near(const Voxel& v) const {
+  Voxel best = v;
+  for_each(box_around(v, options_.seed_search_vox, size_), [&](const Voxel& u) {
+    if (grey(u) > grey(best)) best = u;
+  });
+  return best;
+}
+
+template <typename T>
+Moments AdaptiveThreshold<T>::labelled_around(const Box& box, double reference) const {
+  Moments s;
+  const int width = box.high[0] - box.low[0] + 1;
+  for (int z = box.low[2]; z <= box.high[2]; ++z)
+    for (int y = box.low[1]; y <= box.high[1]; ++y) {
+      std::uint32_t bits = vessel_.run(box.low[0], y, z, width);
+      const std::size_t row = image_.grid.offset({box.low[0], y, z});
+      for (; bits != 0; bits &= bits - 1)
+        s.add(sign_ * static_cast<double>(
+                          image_.voxels[row + static_cast<std::size_t>(std::countr_zero(bits))]) -
+              reference);
+    }
+  return s;
+}
+
+// S2: from the candidate on, always the brightest unlabelled voxel that touches the set (ties: the
+// one met first).
+template <typename T>
+double AdaptiveThreshold<T>::mean_of_brightest_connected(const Voxel& c, const Box& box) const {
+  const int wanted = options_.neighbourhood_vox / 2;
+  struct Rim {
+    double grey;
+    Voxel at;
+  };
+  Rim rim[26 * (kMaxNeighbourhood / 2)];
+  int rim_count = 0;
+  std::uint16_t reached[kMaxNeighbourhood][kMaxNeighbourhood] = {};  // rows of bits: in set or rim
+  const auto mark = [&](const Voxel& v) {
+    std::uint16_t& row = reached[v[2] - box.low[2]][v[1] - box.low[1]];
+    const auto bit = static_cast<std::uint16_t>(1U << (v[0] - box.low[0]));
+    const bool fresh = (row & bit) == 0;
+    row = static_cast<std::uint16_t>(row | bit);
+    return fresh;
+  };
+  mark(c);
+  Voxel last = c;
+  // Sums of differences: a neighbourhood of equal values gives their mean exactly.
+  const double reference = grey(c);
+  double sum = 0;
+  int count = 1;
+  while (count < wanted) {
+    for (int z = std::max(last[2] - 1, box.low[2]); z <= std::min(last[2] + 1, box.high[2]); ++z)
+      for (int y = std::max(last[1] - 1, box.low[1]); y <= std::min(last[1] + 1, box.high[1]); ++y)
+        for (int x = std::max(last[0] - 1, box.low[0]); x <= std::min(last[0] + 1, box.high[0]);
+             ++x) {
+          if (vessel_.test(x, y, z) || background_.test(x, y, z) || !mark({x, y, z})) continue;
+          const double g = grey({x, y, z});
+          if (std::isfinite(g)) rim[rim_count++] = {g, {x, y, z}};
+        }
+    if (rim_count == 0) break;
+    Rim* best = std::max_element(rim, rim + rim_count,
+                                 [](const Rim& a, const Rim& b) { return a.grey < b.grey; });
+    sum += best->grey - reference;
+    ++count;
+    last = best->at;
+    std::move(best + 1, rim + rim_count, best);  // keeps the order of meeting
+    --rim_count;
+  }
+  return reference + sum / count;
+}
+
+template <typename T>
+Decision AdaptiveThreshold<T>::decide(const Voxel& v) const {
+  const Box box = box_around(v, half_, size_);
+  const double here = grey(v);
+  const Moments s1 = labelled_around(box, here);
+  if (s1.count == 0) return {false, std::numeric_limits<double>::infinity()};
+  const double mean = here + s1.mean();
+  const double threshold = mean - options_.deviations * s1.deviation();
+  if (options_.background_level) {
+    // Where the edge of a vessel lies: half way, less where M is generous.
+    constexpr double kSurely = 0.5, kHardly = 0.45;
+    const double level = sign_ * *options_.background_level;
+    if (here >= level + kSurely * (mean - level)) return {true, threshold};
+    if (here < level + kHardly * (mean - level)) return {false, threshold};
+  }
+  return {mean_of_brightest_connected(v, box) >= threshold, threshold};
+}
+
+template <typename T>
+auto AdaptiveThreshold<T>::start(const Vec3& seed_mm, std::size_t index) const -> Result<Start> {
+  const Voxel clicked = nearest_voxel(image_.grid.index_vox(seed_mm));
+  const std::string where = fmt::format("seed {}", index + 1);
+  const std::string place =
+      fmt::format("({:.6g}, {:.6g}, {:.6g}) mm = voxel ({}, {}, {})", seed_mm[0], seed_mm[1],
+                  seed_mm[2], clicked[0], clicked[1], clicked[2]);
+  if (!seed_mm.allFinite() || !image_.grid.contains(clicked))
+    return fail({ErrorKind::kBadInput, "seed is outside the image", where, place,
+                 fmt::format("voxels go from (0, 0, 0) to ({}, {}, {}); world is LPS", size_[0] - 1,
+                             size_[1] - 1, size_[2] - 1)});
+  const Voxel seed = brightest_near(clicked);
+  const double value = grey(seed);
+  if (!admissible(value))
+    return fail({ErrorKind::kBadInput, "no vessel at the seed", where,
+                 fmt::format("{}, grey value {}", place, static_cast<double>(image_[clicked])),
+                 std::isfinite(floor_)
+                     ? fmt::format("the background goes to {:.6g}", *options_.background)
+                     : std::string("the grey value must be finite")});
+  const Box box = box_around(seed, half_, size_);
+  std::vector<double> values;
+  for_each(box, [&](const Voxel& v) {
+    if (std::isfinite(grey(v))) values.push_back(grey(v));
+  });
+  const double threshold = std::max(otsu_threshold(std::move(values)), floor_);
+  if (value < threshold)
+    return fail({ErrorKind::kBadInput, "no vessel at the seed", where,
+                 fmt::format("{}, grey value {}", place, static_cast<double>(image_[clicked])),
+                 fmt::format("the voxels around it split at {:.6g}", sign_ * threshold)});
+  Start out{seed, {seed}};
+  Mask taken;
+  for (std::size_t i = 0; i < 3; ++i) taken.grid.size[i] = box.high[i] - box.low[i] + 1;
+  taken.voxels.assign(taken.grid.voxel_count(), 0);
+  const auto take = [&](const Voxel& v) {
+    auto& t = taken[{v[0] - box.low[0], v[1] - box.low[1], v[2] - box.low[2]}];
+    return std::exchange(t, std::uint8_t{1}) == 0;
+  };
+  take(seed);
+  for (std::size_t k = 0; k < out.voxels.size(); ++k) {
+    Box near = box_around(out.voxels[k], 1, size_);
+    for (std::size_t i = 0; i < 3; ++i) {
+      near.low[i] = std::max(near.low[i], box.low[i]);
+      near.high[i] = std::min(near.high[i], box.high[i]);
+    }
+    for_each(near, [&](const Voxel& v) {
+      if (grey(v) >= threshold && take(v)) out.voxels.push_back(v);
+    });
+  }
+  return out;
+}
+
+}  // namespace angiospline::region_growing
