@@ -187,6 +187,8 @@ Result<void> check(const PhantomOptions& o) {
   if (o.ends < 1) return bad("number of ends is not usable", o.ends, "at least 1");
   if (!(o.loss_deg >= 0 && o.loss_deg < 45))
     return bad("stretch of lost signal is not usable", o.loss_deg, "0 to below 45 degrees");
+  if (!(o.loss_depth >= 0 && o.loss_depth <= 1))
+    return bad("share of lost signal is not usable", o.loss_depth, "0 to 1");
   return {};
 }
 
@@ -201,7 +203,7 @@ ImageGrid grid_for(const Vec3& field_mm, const PhantomOptions& o) {
   return grid;
 }
 
-// 1 where the ring carries signal, 0 where it is lost; smooth over a quarter of the stretch.
+// 1 where the ring carries signal, less where it is lost; smooth over a quarter of the stretch.
 double ring_signal(const Ring& ring, const Vec3& p, const PhantomOptions& o) {
   const Vec3 d = p - ring.centre_mm;
   const double angle = std::atan2(d.dot(ring.axis.cross(ring.start)), d.dot(ring.start));
@@ -209,7 +211,7 @@ double ring_signal(const Ring& ring, const Vec3& p, const PhantomOptions& o) {
   if (from_loss < 0) from_loss += 45;
   from_loss = std::min(from_loss, 45 - from_loss);
   const double t = std::clamp((from_loss - o.loss_deg * 3 / 8) / (o.loss_deg / 4), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
+  return 1 - o.loss_depth * (1 - t * t * (3 - 2 * t));
 }
 
 void lose_signal(Image<float>& filled, const PhantomOptions& o) {

@@ -43,6 +43,7 @@ struct PhantomOptions {
   // apart).
   double loss_deg = 0.0;
   double loss_phase_deg = 0.0;
+  double loss_depth = 1.0;  // share of the contrast lost there
   // Random tree only.
   double field_mm = 256.0;     // edge of the cubic field of view
   int ends = 31;               // leaves wanted, besides the root
