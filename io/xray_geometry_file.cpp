@@ -1,8 +1,9 @@
 #include "io/xray_geometry_file.h"
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -80,15 +81,18 @@ Result<XrayGeometry> c_arm_of(const Fields& f, int pixels) {
 
 Result<XrayGeometry> full_geometry_of(const Fields& f) {
   XrayGeometry g;
-  for (auto [key, target] : {std::pair{"source_mm", &g.source_mm}, {"first_pixel_mm", &g.first_pixel_mm},
-                             {"column_axis", &g.column_axis}, {"row_axis", &g.row_axis}}) {
+  for (auto [key, target] : {std::pair{"source_mm", &g.source_mm},
+                             {"first_pixel_mm", &g.first_pixel_mm},
+                             {"column_axis", &g.column_axis},
+                             {"row_axis", &g.row_axis}}) {
     const auto v = f.vector<3>(key);
     if (!v) return fail(v.error());
     *target = *v;
   }
   const auto pixel = f.vector<2>("pixel_mm");
   if (!pixel) return fail(pixel.error());
-  if (!(pixel->minCoeff() > 0)) return fail(f.error("pixel_mm", "pixel is not positive", "above 0"));
+  if (!(pixel->minCoeff() > 0))
+    return fail(f.error("pixel_mm", "pixel is not positive", "above 0"));
   g.pixel_mm = *pixel;
   const double sine = g.column_axis.normalized().cross(g.row_axis.normalized()).norm();
   if (!(sine > 0.01))  // less than a degree apart spans no plane that anyone meant
@@ -130,7 +134,10 @@ Result<std::vector<XrayView>> read_xray_views(const std::filesystem::path& path)
   const Json json = Json::parse(*bytes, nullptr, false);
   if (json.is_discarded() || !json.is_object() || !json.contains("views") ||
       !json.at("views").is_array() || json.at("views").empty())
-    return fail({ErrorKind::kBadInput, "is not a file of X-ray views", path.string(), {},
+    return fail({ErrorKind::kBadInput,
+                 "is not a file of X-ray views",
+                 path.string(),
+                 {},
                  "it must be JSON with a non-empty array \"views\""});
   std::vector<XrayView> views;
   for (std::size_t k = 0; k < json.at("views").size(); ++k) {

@@ -17,8 +17,8 @@ namespace angiospline {
 //      "column_axis": [1, 0, 0], "row_axis": [0, 1, 0], "pixel_mm": [0.8, 0.8]}]}
 // A view is either a C-arm (see recovery/xray.h) or source and detector in full; axes are made unit
 // vectors. Image names are relative to the file; the number of pixels is the image's.
-// Errors name the file, the view and the field: not JSON, missing or non-numeric fields, distances or
-// pixels not positive, axes that are zero or parallel, image errors.
+// Errors name the file, the view and the field: not JSON, missing or non-numeric fields, distances
+// or pixels not positive, axes that are zero or parallel, image errors.
 Result<std::vector<XrayView>> read_xray_views(const std::filesystem::path& path);
 
 }  // namespace angiospline

@@ -9,6 +9,7 @@
 
 #include "recovery/gaussian.h"
 #include "recovery/morphology.h"
+#include "recovery/topology_numbers.h"
 #include "recovery/vesselness.h"
 
 namespace angiospline {
@@ -191,6 +192,18 @@ GrowOptions chosen(const AnyImage& image, const SegmentOptions& options, Segment
   return grow;
 }
 
+// A tree of vessels has few loops (the circle of Willis one, a kissing pair one more); a leak into
+// tissue runs round every dark spot there.
+std::optional<std::string> leak_sign(const Mask& mask) {
+  constexpr std::int64_t kLoops = 20;
+  const TopologyNumbers numbers = topology_numbers(mask);
+  if (numbers.cycles <= kLoops) return std::nullopt;
+  return fmt::format(
+      "the mask has {} loops: it has probably leaked into tissue; a higher background threshold, a "
+      "smaller M or other seeds may help",
+      numbers.cycles);
+}
+
 }  // namespace
 
 Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const Progress& progress) {
@@ -229,6 +242,8 @@ Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const P
   Filled cavities = fill_cavities(holes.mask);
   report.filled_voxels = holes.voxels + cavities.voxels;
   report.components = component_count(cavities.mask, Neighbours::kCorners26);
+  if (std::optional<std::string> leak = leak_sign(cavities.mask))
+    report.warnings.push_back(std::move(*leak));
   return Segmented{std::move(cavities.mask), std::move(report)};
 }
 

@@ -1,11 +1,10 @@
-#include "io/xray_geometry_file.h"
+#include <fstream>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <fstream>
-
 #include "io/image_file.h"
+#include "io/xray_geometry_file.h"
 
 namespace angiospline {
 namespace {

@@ -174,6 +174,24 @@ TEST(Segment, ChoosesTheSameForAScaledAndShiftedImage) {
   EXPECT_NEAR(b->report.background, 4 * a->report.background + 64, 0.5);
 }
 
+TEST(Segment, WarnsOfALeakIntoTissue) {
+  // A vessel that touches a lattice of bars as bright as itself.
+  const auto p = make_phantom(PhantomKind::kCylinder, {});
+  Image<std::int16_t> image = p->image;
+  for (std::size_t i = 0; i < image.voxels.size(); ++i) {
+    const Voxel v = image.grid.voxel(i);
+    const int in_bars = (v[0] % 12 < 5) + (v[1] % 12 < 5) + (v[2] % 12 < 5);
+    if (v[0] >= 36 && in_bars >= 2) image.voxels[i] = 1200;
+  }
+  SegmentOptions o;
+  o.seeds_mm = {Vec3(26, 31.5, 31.5)};
+  const auto leaked = segment(image, o), sound = segment(p->image, o);
+  ASSERT_TRUE(leaked && sound);
+  EXPECT_TRUE(sound->report.warnings.empty());
+  ASSERT_EQ(leaked->report.warnings.size(), 1U);
+  EXPECT_NE(leaked->report.warnings[0].find("leaked"), std::string::npos);
+}
+
 TEST(Segment, DarkVesselsAreFoundToo) {
   PhantomOptions o;
   o.background = 1200;
