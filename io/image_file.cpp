@@ -88,11 +88,9 @@ Result<void> check_axes(const Description& d, const fs::path& path, int wanted) 
     return bad(path, "voxels are vectors", fmt::format("{} components", d.components),
                "an image has one value a voxel");
   const std::string shape = fmt::format("{}", fmt::join(d.axes, "x"));
-  long long total = 1;
   for (const long long n : d.axes) {
     if (n <= 0) return bad(path, "image has no voxels", shape, "every extent must be positive");
     if (n > 65535) return bad(path, "image is too large", shape, "extents go up to 65535");
-    total *= n;
   }
   const bool beyond = std::any_of(d.axes.begin() + std::min<std::ptrdiff_t>(3, std::ssize(d.axes)),
                                   d.axes.end(), [](long long n) { return n > 1; });
