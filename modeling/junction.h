@@ -48,10 +48,9 @@ struct Junction {
 };
 
 struct JunctionOptions {
-  double margin = 1.0;  // opening beyond the blend, in radii of the branch
-  double blend = 0.15;  // width of the blend between branches, in radii, at the centre ...
-  double growth = 0.3;  // ... times sqrt(1 + (growth * distance)^2), distance in radii: rounds the
-                        // crotch of an acute pair, which lies far out
+  double margin = 1.0;     // opening beyond the blend, in radii of the branch
+  double blend = 0.15;     // width of the blend between branches, in radii of the thinner one
+  double rounding = 0.09;  // radius of curvature at the crotch of an acute pair, in radii
 };
 
 // How far from the centre each branch's opening comes to lie, in mm; the order of the spec.

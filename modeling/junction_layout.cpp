@@ -237,7 +237,7 @@ class Relaxation {
     for (const int node : movable_) improve(node, epsilon);
   }
 
-  // Half of the way to where the legs arrive.
+  // Part of the way to where the legs arrive.
   void follow_legs() {
     for (std::size_t b = 0; b < openings_.size(); ++b) {
       OpeningFrame& frame = openings_[b];
@@ -245,7 +245,7 @@ class Relaxation {
       for (std::size_t k = 0; k < frame.seams_rad.size(); ++k) {
         const int leg = grid_.at(topology_.sectors[b][k], 1, 0);
         const double turn = wrapped(azimuth(frame, nodes_.col(leg)) - frame.seams_rad[k]);
-        wanted.push_back(frame.seams_rad[k] + turn / 2);
+        wanted.push_back(frame.seams_rad[k] + options_.follow * turn);
       }
       frame.seams_rad = bounded_seams(wanted);
     }
@@ -446,7 +446,7 @@ JunctionLayout relaxed_layout(const JunctionTopology& topology, const JunctionTa
   for (int k = 0; k < options.coarse_sweeps; ++k) {
     coarse.sweep(epsilon);
     epsilon = std::max(0.02, 0.85 * epsilon);
-    if (k % 8 == 7) coarse.follow_legs();
+    if (k % 8 == 7 && options.follow > 0) coarse.follow_legs();
     if (k % 10 == 9) coarse.set_lengths();
   }
   const JunctionLayout start = std::move(coarse).result();

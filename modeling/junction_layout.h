@@ -37,6 +37,7 @@ struct LayoutOptions {
   int coarse_sweeps = 60;    // on 5 x 5 nodes a patch, seams following their legs
   int fine_sweeps = 30;      // on 9 x 9 nodes
   double area_weight = 0.5;  // of even areas against right angles
+  double follow = 0.5;       // part of the way seams turn towards their legs, every eighth sweep
 };
 
 // Starts from the spherical Voronoi diagram of the directions, moved towards the crotches, then

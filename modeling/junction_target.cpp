@@ -1,6 +1,7 @@
 #include "modeling/junction_target.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -10,57 +11,149 @@
 namespace angiospline {
 namespace {
 
-// Terms this far below the largest are lost to rounding in the sum.
-constexpr double kNegligible = 38.0;
+// Branches whose distance exceeds the least one by this many widths are lost in the sum.
+constexpr double kNegligible = 25.0;
+// The ray's start is rounded over this part of the radius, so that gradients have no kinks.
+constexpr double kRoundedStart = 0.25;
+constexpr std::size_t kMostActive = 24;
 
-double capsule_distance(const TargetBranch& branch, const Vec3& x, Vec3* gradient) {
-  const double along = std::max(0.0, branch.direction.dot(x));
-  const Vec3 away = x - along * branch.direction;
-  const double length = away.norm();
-  if (gradient != nullptr) {
-    *gradient = length > 0 ? Vec3(away / length) : Vec3(branch.direction.unitOrthogonal());
-  }
-  return length - branch.radius;
+// A number and its gradient in space.
+struct Dual {
+  double v = 0;
+  Vec3 d = Vec3::Zero();
+};
+Dual operator+(const Dual& a, const Dual& b) { return {a.v + b.v, a.d + b.d}; }
+Dual operator*(const Dual& a, const Dual& b) { return {a.v * b.v, a.v * b.d + b.v * a.d}; }
+Dual operator*(double a, const Dual& b) { return {a * b.v, a * b.d}; }
+Dual operator/(const Dual& a, const Dual& b) {
+  const double q = a.v / b.v;
+  return {q, (a.d - q * b.d) / b.v};
+}
+Dual exp(const Dual& a) {
+  const double e = std::exp(a.v);
+  return {e, e * a.d};
+}
+
+// Distance to a ray capsule, its gradient, and the gradient's derivative (symmetric).
+struct Distance {
+  double value;
+  Vec3 gradient;
+  Mat3 hessian;
+};
+
+Distance capsule(const TargetBranch& branch, const Vec3& x) {
+  const Vec3& d = branch.direction;
+  const double y = d.dot(x);
+  const double e = kRoundedStart * branch.radius;
+  const double root = std::sqrt(y * y + e * e);
+  const double along = (y + root) / 2;  // max(0, y), rounded
+  const double slope = along / root;
+  const double bend = e * e / (2 * root * root * root);
+  const Vec3 away = x - along * d;
+  const double length = std::max(away.norm(), 1e-9 * branch.radius);
+  const double off = d.dot(away);  // y - along <= 0
+  // length^2 = x.x - 2 along y + along^2.
+  const Vec3 half = away - slope * off * d;
+  const Mat3 half_slope =
+      Mat3::Identity() + (-2 * slope - bend * off + slope * slope) * d * d.transpose();
+  const Vec3 gradient = half / length;
+  return {length - branch.radius, gradient,
+          (half_slope - gradient * gradient.transpose()) / length};
+}
+
+double capsule_value(const TargetBranch& branch, const Vec3& x) {
+  const double y = branch.direction.dot(x);
+  const double e = kRoundedStart * branch.radius;
+  const double along = (y + std::sqrt(y * y + e * e)) / 2;
+  return (x - along * branch.direction).norm() - branch.radius;
+}
+
+// 0 for gradients a right angle apart or more, 1 for equal ones.
+Dual agreement(const Distance& a, const Distance& b) {
+  const double t = a.gradient.dot(b.gradient);
+  if (t <= 0) return {};
+  return {t * t, 2 * t * (a.hessian * b.gradient + b.hessian * a.gradient)};
 }
 
 }  // namespace
 
-JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend, double growth)
-    : branches_(std::move(branches)), blend_(blend), growth_squared_(growth * growth) {}
-
-double JunctionTarget::exponent(std::size_t i, const Vec3& x, Vec3* gradient) const {
-  const TargetBranch& branch = branches_[i];
-  const double delta = capsule_distance(branch, x, gradient);
-  const double r = branch.radius;
-  const double reach = std::sqrt(r * r + growth_squared_ * x.squaredNorm());
-  const double width = blend_ * reach;
-  if (gradient != nullptr) {
-    const double grows = growth_squared_ * delta / (width * reach * reach);
-    *gradient = *gradient / width - grows * x;
+JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend, double rounding)
+    : branches_(std::move(branches)) {
+  const Eigen::Index n = static_cast<Eigen::Index>(branches_.size());
+  widths_.resize(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const TargetBranch& a = branches_[static_cast<std::size_t>(i)];
+      const TargetBranch& b = branches_[static_cast<std::size_t>(j)];
+      const double r = std::min(a.radius, b.radius);
+      widths_(i, j) = blend * r;
+      if (i == j) continue;
+      // A crotch of half angle h has curvature cos^2 h / (k sin h).
+      const double half = std::acos(std::clamp(a.direction.dot(b.direction), -1.0, 1.0)) / 2;
+      const double cosine = std::cos(half);
+      widths_(i, j) = std::max(blend * r, rounding * r * cosine * cosine / std::sin(half));
+    }
   }
-  return delta / width;
 }
 
 JunctionTarget::Value JunctionTarget::at(const Vec3& x) const {
+  // Distances of all, then derivatives of those that count.
   double least = std::numeric_limits<double>::infinity();
-  double sum = 0;
-  Vec3 gradient_sum = Vec3::Zero();
-  for (std::size_t i = 0; i < branches_.size(); ++i) {
-    Vec3 gradient;
-    const double e = exponent(i, x, &gradient);
-    if (e - least > kNegligible) continue;
-    if (e < least) {  // rescale to the new largest term
-      const double scale = std::isinf(least) ? 0.0 : std::exp(e - least);
-      sum = sum * scale + 1;
-      gradient_sum = gradient_sum * scale + gradient;
-      least = e;
-    } else {
-      const double term = std::exp(least - e);
-      sum += term;
-      gradient_sum += term * gradient;
+  std::array<double, 64> value{};
+  const std::size_t n = std::min<std::size_t>(branches_.size(), value.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    value[i] = capsule_value(branches_[i], x);
+    least = std::min(least, value[i]);
+  }
+  std::array<std::size_t, kMostActive> active{};
+  std::array<Distance, kMostActive> distance;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < n && count < kMostActive; ++i) {
+    if (value[i] - least > kNegligible * widths_.row(static_cast<Eigen::Index>(i)).maxCoeff())
+      continue;
+    active[count] = i;
+    distance[count++] = capsule(branches_[i], x);
+  }
+  if (count == 1) {
+    const double k =
+        widths_(static_cast<Eigen::Index>(active[0]), static_cast<Eigen::Index>(active[0]));
+    return {distance[0].value / k, distance[0].gradient / k};
+  }
+  // The pairs' agreement and the width k.
+  std::array<std::array<Dual, kMostActive>, kMostActive> c;
+  Dual top, bottom;
+  for (std::size_t a = 0; a < count; ++a) {
+    c[a][a].v = 1;
+    for (std::size_t b = a + 1; b < count; ++b) {
+      c[a][b] = c[b][a] = agreement(distance[a], distance[b]);
+      const auto i = static_cast<Eigen::Index>(active[a]);
+      const auto j = static_cast<Eigen::Index>(active[b]);
+      const double k = widths_(i, j);
+      // Nearness of x to both, over a width that does not depend on the pair's own.
+      const double reach = std::min(branches_[active[a]].radius, branches_[active[b]].radius);
+      const Dual apart{(distance[a].value + distance[b].value) / reach,
+                       (distance[a].gradient + distance[b].gradient) / reach};
+      const Dual near = exp(-1.0 * apart);
+      const Dual weight = near * (Dual{1.02, Vec3::Zero()} + -1.0 * c[a][b]);
+      top = top + k * weight;
+      bottom = bottom + weight;
     }
   }
-  return {least - std::log(sum), gradient_sum / sum};
+  if (!(bottom.v > 1e-290)) return {least / widths_(0, 0), distance[0].gradient / widths_(0, 0)};
+  const Dual k = top / bottom;
+  std::array<Dual, kMostActive> w;
+  for (std::size_t a = 0; a < count; ++a) {
+    w[a] = exp(Dual{-(distance[a].value - least), -distance[a].gradient} / k);
+  }
+  Dual sum;
+  for (std::size_t a = 0; a < count; ++a) {
+    Dual mixed;
+    for (std::size_t b = 0; b < count; ++b) mixed = mixed + c[a][b] * w[b];
+    if (w[a].v > 0) sum = sum + w[a] * w[a] / mixed;
+  }
+  // -log(sum exp(-least / k)), with `least` held while the terms were scaled.
+  const Dual lifted = Dual{least, Vec3::Zero()} / k;
+  return {lifted.v - std::log(sum.v), lifted.d - sum.d / sum.v};
 }
 
 JunctionTarget::Foot JunctionTarget::foot(const Vec3& x) const {
@@ -92,18 +185,21 @@ Vec3 JunctionTarget::on_ray(const Vec3& w, double longest) const {
 }
 
 double JunctionTarget::others_share(int i, const Vec3& x) const {
+  const auto own = static_cast<std::size_t>(i);
+  const Distance mine = capsule(branches_[own], x);
   double sum = 0;
   for (std::size_t j = 0; j < branches_.size(); ++j) {
-    if (static_cast<int>(j) != i) sum += std::exp(-exponent(j, x, nullptr));
+    if (j == own) continue;
+    const Distance other = capsule(branches_[j], x);
+    const double k = widths_(i, static_cast<Eigen::Index>(j));
+    sum += std::exp(-other.value / k) * (1.01 - agreement(mine, other).v);
   }
   return sum;
 }
 
 double JunctionTarget::union_distance(const Vec3& x) const {
   double least = std::numeric_limits<double>::infinity();
-  for (const TargetBranch& branch : branches_) {
-    least = std::min(least, capsule_distance(branch, x, nullptr));
-  }
+  for (const TargetBranch& branch : branches_) least = std::min(least, capsule_value(branch, x));
   return least;
 }
 

@@ -13,16 +13,20 @@ struct TargetBranch {
   double radius = 0.0;
 };
 
-// S: sum_i exp(-delta_i / k_i) = 1, delta_i the signed distance to branch i's capsule and
-// k_i = blend r_i sqrt(1 + growth^2 |x|^2 / r_i^2). S is star-shaped about the origin, contains
-// every capsule and leaves them as the distance to the other branches grows.
+// S is where a smooth union of the signed distances delta_i vanishes. With w_i = exp(-delta_i / k),
+//   sum_i w_i^2 / sum_j c_ij w_j = 1.
+// c_ij in [0, 1] says how far the gradients of delta_i and delta_j agree, c_ii = 1: where they are
+// opposed this is the usual blend sum_i w_i = 1, where they agree (the two halves of a straight
+// trunk) nothing is added and S is the cylinder itself. k is the mean of the pairs' widths weighted
+// by w and by disagreement: blend * min(r_i, r_j), or what rounds the crotch of an acute pair to a
+// stated curvature. S leaves the capsules as the distance to the other branches grows.
 class JunctionTarget {
  public:
-  JunctionTarget(std::vector<TargetBranch> branches, double blend, double growth);
+  JunctionTarget(std::vector<TargetBranch> branches, double blend, double rounding);
 
   const std::vector<TargetBranch>& branches() const { return branches_; }
 
-  // -log of the sum and its gradient: negative inside, zero on S.
+  // -log of the left-hand side and its gradient: negative inside, zero on S.
   struct Value {
     double value;
     Vec3 gradient;
@@ -40,18 +44,15 @@ class JunctionTarget {
   // inside on a function that grows along the ray.
   Vec3 on_ray(const Vec3& w, double longest) const;
 
-  // The other branches' share sum_{j != i} exp(-delta_j / k_j) at x.
+  // The other branches' share at x: sum_{j != i} w_j (1 - c_ij).
   double others_share(int i, const Vec3& x) const;
 
   // Signed distance to the union of the capsules.
   double union_distance(const Vec3& x) const;
 
  private:
-  double exponent(std::size_t i, const Vec3& x, Vec3* gradient) const;
-
   std::vector<TargetBranch> branches_;
-  double blend_;
-  double growth_squared_;
+  Eigen::MatrixXd widths_;  // k of each pair
 };
 
 }  // namespace angiospline

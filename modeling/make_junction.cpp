@@ -17,20 +17,21 @@
 namespace angiospline {
 namespace {
 
-// One set of choices; blend and growth are relative to those of the plan.
+// One set of choices; blend and rounding are relative to those of the plan.
 struct Setting {
   double blend = 1.0;
-  double growth = 1.0;
+  double rounding = 1.0;
   double area_weight = 0.5;
   double merge_deg = 5.0;
+  double follow = 0.5;
 };
 
-constexpr std::array<Setting, 6> kLadder{{{1.0, 1.0, 0.5, 5.0},
-                                          {1.0, 1.0, 0.1, 5.0},
-                                          {0.7, 1.0, 0.5, 10.0},
-                                          {1.3, 1.0, 0.5, 5.0},
-                                          {1.0, 1.0, 2.0, 2.0},
-                                          {0.5, 1.0, 0.2, 5.0}}};
+constexpr std::array<Setting, 6> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5},
+                                          {1.0, 1.0, 0.5, 5.0, 0.0},
+                                          {1.5, 1.3, 0.5, 5.0, 0.5},
+                                          {1.5, 1.5, 0.2, 10.0, 0.0},
+                                          {0.7, 1.0, 1.0, 2.0, 0.5},
+                                          {1.0, 1.5, 0.1, 5.0, 0.5}}};
 
 struct Attempt {
   JunctionTopology topology;
@@ -45,9 +46,10 @@ Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
   JunctionTopology topology =
       junction_topology(directions, setting.merge_deg * std::numbers::pi / 180);
   const JunctionTarget target(plan.branches, setting.blend * plan.blend,
-                              setting.growth * plan.growth);
+                              setting.rounding * plan.rounding);
   LayoutOptions layout_options;
   layout_options.area_weight = setting.area_weight;
+  layout_options.follow = setting.follow;
   const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
   SmoothedNet smooth = smooth_junction(topology, target, layout);
   JunctionQuality quality = junction_quality(topology, target, smooth.net);

@@ -115,9 +115,9 @@ Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOption
   Error too_short;
   for (const double part : {1.0, 0.75, 0.5, 1.0 / 3}) {
     plan.blend = part * options.blend;
-    plan.growth = part * options.growth;
+    plan.rounding = part * options.rounding;
     plan.distances.clear();
-    const JunctionTarget target(plan.branches, plan.blend, plan.growth);
+    const JunctionTarget target(plan.branches, plan.blend, plan.rounding);
     bool fits = true;
     for (std::size_t b = 0; b < spec.branches.size() && fits; ++b) {
       const double r = plan.branches[b].radius;

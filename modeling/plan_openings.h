@@ -14,7 +14,7 @@ namespace angiospline {
 struct OpeningPlan {
   double unit_mm = 1.0;  // the largest radius: all later work is done in this unit
   double blend = 0.0;
-  double growth = 0.0;
+  double rounding = 0.0;
   std::vector<TargetBranch> branches;
   std::vector<double> distances;
 };
