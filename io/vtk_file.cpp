@@ -94,6 +94,14 @@ Result<void> write_xml(const std::filesystem::path& path, Data& data) {
   return write_file(path, writer->GetOutputString());
 }
 
+std::string lower_case_suffix(const std::filesystem::path& path) {
+  std::string suffix = path.extension().string();
+  for (char& c : suffix) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return suffix;
+}
+
 Error unreadable(const std::filesystem::path& path, std::string what, std::string rule) {
   return {ErrorKind::kBadInput, std::move(what), path.string(), {}, std::move(rule)};
 }
@@ -162,14 +170,15 @@ Result<void> write_vtk_mesh(const std::filesystem::path& path, const TriangleMes
                             const std::vector<MeshField>& fields) {
   EXPECTS(!find_defect(mesh));
   for (const MeshField& field : fields) EXPECTS(field.values.size() == mesh.points_mm.cols());
-  if (path.extension() == ".vtp") {
+  const std::string suffix = lower_case_suffix(path);
+  if (suffix == ".vtp") {
     vtkNew<vtkPolyData> data;
     data->SetPoints(vtk_points(mesh.points_mm));
     data->SetPolys(vtk_triangles(mesh.triangles));
     add_mesh_arrays(*data, mesh, fields);
     return write_xml<vtkXMLPolyDataWriter>(path, *data);
   }
-  if (path.extension() == ".vtu") {
+  if (suffix == ".vtu") {
     vtkNew<vtkUnstructuredGrid> data;
     data->SetPoints(vtk_points(mesh.points_mm));
     data->SetCells(VTK_TRIANGLE, vtk_triangles(mesh.triangles));
@@ -183,7 +192,7 @@ Result<void> write_vtk_mesh(const std::filesystem::path& path, const TriangleMes
 Result<TriangleMesh> read_vtk_mesh(const std::filesystem::path& path) {
   if (const auto bytes = read_file(path); !bytes) return fail(bytes.error());
   TriangleMesh mesh;
-  if (path.extension() == ".vtu") {
+  if (lower_case_suffix(path) == ".vtu") {
     vtkNew<vtkXMLUnstructuredGridReader> reader;
     if (read_xml(*reader, path)) mesh = mesh_of(*reader->GetOutput());
   } else {

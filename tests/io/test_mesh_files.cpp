@@ -238,7 +238,7 @@ TEST_F(MeshFiles, BrokenStlIsRefusedWithItsLine) {
 
 TEST_F(MeshFiles, VtkFilesReadBackWithTheirParts) {
   const TriangleMesh mesh = sample_mesh();
-  for (const char* name : {"a.vtp", "a.vtu"}) {
+  for (const char* name : {"a.vtp", "a.vtu", "b.VTU"}) {
     SCOPED_TRACE(name);
     ASSERT_TRUE(write_vtk_mesh(folder_ / name, mesh, {height_of(mesh)}));
     const auto back = read_vtk_mesh(folder_ / name);
