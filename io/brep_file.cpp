@@ -131,9 +131,12 @@ Result<Solid> read_brep(const std::filesystem::path& path, const Progress& progr
     if (count == 0) return bad("holds no face");
     file.clear();
     std::vector<SolidFace> faces = read_faces(file, count);
-    for (std::size_t k = faces.size(); k < count; ++k) {
-      const std::string name = "face_" + std::to_string(k + 1);
-      faces.push_back({name, FaceKind::kWall, 0.0, face_colour(FaceKind::kWall, name)});
+    if (faces.empty()) {
+      for (std::size_t k = 0; k < count; ++k) {
+        const std::string name = "face_" + std::to_string(k + 1);
+        faces.push_back({name, FaceKind::kWall, 0.0, face_colour(FaceKind::kWall, name)});
+      }
+      mark_caps(shape, faces);
     }
     return make_solid_value(shape, std::move(faces));
   } catch (const Standard_Failure& failure) {

@@ -10,6 +10,7 @@
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
+#include <Geom_Plane.hxx>
 #include <Geom_Surface.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
@@ -20,7 +21,10 @@
 #include <TDF_ChildIterator.hxx>
 #include <TDF_LabelSequence.hxx>
 #include <TDataStd_Name.hxx>
+#include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
+#include <TopTools_IndexedDataMapOfShapeListOfShape.hxx>
+#include <TopTools_ListOfShape.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Compound.hxx>
 #include <XCAFApp_Application.hxx>
@@ -179,13 +183,14 @@ Result<Solid> solid_of(const Handle(TDocStd_Document) & document,
     }
   }
   std::vector<SolidFace> faces;
+  bool has_names = false;
   if (!shape.IsNull()) {
     for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {
       const auto note = notes.find(at.Current().TShape().get());
       SolidFace face;
-      face.name = note != notes.end() && note->second.name && !note->second.name->empty()
-                      ? *note->second.name
-                      : "face_" + std::to_string(faces.size() + 1);
+      const bool is_named = note != notes.end() && note->second.name && !note->second.name->empty();
+      has_names = has_names || is_named;
+      face.name = is_named ? *note->second.name : "face_" + std::to_string(faces.size() + 1);
       face.kind = kind_of_name(face.name);
       face.colour = note != notes.end() && note->second.colour ? *note->second.colour
                                                                : face_colour(face.kind, face.name);
@@ -199,7 +204,31 @@ Result<Solid> solid_of(const Handle(TDocStd_Document) & document,
                  {},
                  "a model has at least one surface"});
   }
+  if (!has_names) mark_caps(shape, faces);
   return make_solid_value(shape, std::move(faces));
+}
+
+void mark_caps(const TopoDS_Shape& shape, std::vector<SolidFace>& faces) {
+  TopTools_IndexedDataMapOfShapeListOfShape faces_of_edges;
+  TopExp::MapShapesAndAncestors(shape, TopAbs_EDGE, TopAbs_FACE, faces_of_edges);
+  const auto is_plane = [](const TopoDS_Shape& face) {
+    return BRep_Tool::Surface(TopoDS::Face(face))->IsKind(STANDARD_TYPE(Geom_Plane));
+  };
+  const auto is_cap = [&](const TopoDS_Shape& face) {
+    if (!is_plane(face) || count(face, TopAbs_WIRE) != 1) return false;
+    for (TopExp_Explorer edge(face, TopAbs_EDGE); edge.More(); edge.Next()) {
+      const TopTools_ListOfShape& neighbours = faces_of_edges.FindFromKey(edge.Current());
+      if (neighbours.Extent() < 2) return false;
+      for (const TopoDS_Shape& other : neighbours) {
+        if (!other.IsSame(face) && is_plane(other)) return false;
+      }
+    }
+    return true;
+  };
+  std::size_t k = 0;
+  for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next(), ++k) {
+    if (is_cap(at.Current())) faces[k].kind = FaceKind::kCap;
+  }
 }
 
 Result<void> expect_same(const Solid& written, const Solid& read,

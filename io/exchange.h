@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include <Message_ProgressIndicator.hxx>
 #include <TDocStd_Document.hxx>
+#include <TopoDS_Shape.hxx>
 
 #include "base/progress.h"
 #include "base/result.h"
@@ -26,10 +28,15 @@ Handle(TDocStd_Document) document_of(const Solid& solid, const std::string& prod
 Handle(TDocStd_Document) empty_document();
 
 // All free shapes of the document as one value, with the names and colours of its faces; faces
-// without a name are called "face_<k>", counted from 1. Kinds come from the names.
+// without a name are called "face_<k>", counted from 1. Kinds come from the names; where no face
+// has one, plane faces with one loop and only curved neighbours are caps: the ends of a tube.
 // Errors: there is no face in it; `path` says where.
 Result<Solid> solid_of(const Handle(TDocStd_Document) & document,
                        const std::filesystem::path& path);
+
+// Marks as caps the plane faces with one loop whose neighbours are all curved. Requires one entry
+// of `faces` for each face of the shape, in its order.
+void mark_caps(const TopoDS_Shape& shape, std::vector<SolidFace>& faces);
 
 // Nothing if `read` is what was written: solids, closed shells, faces in order with names and
 // kinds, the surfaces' bounding control points within 1e-6 of the model's size; otherwise what

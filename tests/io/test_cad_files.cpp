@@ -2,6 +2,9 @@
 #include <fstream>
 #include <functional>
 
+#include <BRepPrimAPI_MakeBox.hxx>
+#include <BRepPrimAPI_MakeCylinder.hxx>
+#include <BRepTools.hxx>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -9,6 +12,7 @@
 #include "io/brep_file.h"
 #include "io/iges_file.h"
 #include "io/step_file.h"
+#include "modeling/certificate.h"
 #include "tests/modeling/crafted_networks.h"
 #include "tests/modeling/sample_networks.h"
 
@@ -119,6 +123,39 @@ TEST_F(CadFiles, AreNotLeftHalfWrittenWhenStopped) {
     EXPECT_EQ(done.error().kind, ErrorKind::kCancelled);
   }
   EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(CadFiles, ByOthersWithoutNamesAreNumberedAndTheirEndsAreCaps) {
+  const fs::path path = folder_ / "foreign.brep";
+  BRepTools::Write(BRepPrimAPI_MakeCylinder(1, 5).Shape(), path.c_str());
+  const Solid tube = read_brep(path).value();
+  ASSERT_EQ(tube.faces.size(), 3U);
+  EXPECT_EQ(tube.faces[0].name, "face_1");
+  EXPECT_EQ(tube.faces[0].kind, FaceKind::kWall);
+  EXPECT_EQ(tube.faces[1].kind, FaceKind::kCap);
+  EXPECT_EQ(tube.faces[2].kind, FaceKind::kCap);
+  const Certificate c = certify(tube).value();
+  EXPECT_EQ(c.smooth_edges, 1);  // the seam
+  EXPECT_LT(c.max_normal_angle_deg, 1e-9);
+  BRepTools::Write(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), path.c_str());
+  for (const SolidFace& face : read_brep(path).value().faces) {
+    EXPECT_EQ(face.kind, FaceKind::kWall);
+  }
+}
+
+TEST_F(CadFiles, InOtherUnitsAreReadInMillimetres) {
+  const Solid written = sample();
+  const fs::path path = folder_ / "model.step";
+  ASSERT_TRUE(write_step(written, path));
+  std::string text = read_file(path).value();
+  const std::string unit = "SI_UNIT(.MILLI.,.METRE.)";
+  ASSERT_NE(text.find(unit), std::string::npos);
+  for (std::size_t at = text.find(unit); at != std::string::npos; at = text.find(unit)) {
+    text.replace(at, unit.size(), "SI_UNIT(.CENTI.,.METRE.)");
+  }
+  ASSERT_TRUE(write_file(path, text));
+  const double in_mm = certify(written).value().volume_mm3;
+  EXPECT_NEAR(certify(read_step(path).value()).value().volume_mm3, 1000 * in_mm, 1e-6 * in_mm);
 }
 
 TEST_F(CadFiles, ThatCannotBeWrittenAreNamed) {
