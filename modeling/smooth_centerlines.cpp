@@ -10,6 +10,7 @@
 
 #include "modeling/branch_smoother.h"
 #include "modeling/clean_tree.h"
+#include "modeling/overlaps.h"
 
 namespace angiospline {
 namespace {
@@ -21,6 +22,8 @@ constexpr const char* kStage = "smooth centerlines";
 // A junction's openings lie farther out than this, in radii of its thickest branch: bends inside do
 // not reach any wall.
 constexpr double kHidden = 1.5;
+
+constexpr std::size_t kNamedOverlaps = 50;  // pairs that are warned of by name
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -73,6 +76,18 @@ void place_nodes(CenterlineTree& tree, const std::vector<std::optional<BranchSmo
     const double most = largest_move * radii[n].thinnest;
     if (!move.allFinite()) continue;
     position += move.norm() > most ? Vec3(most / move.norm() * move) : move;
+  }
+}
+
+void warn_of_overlaps(SmoothedTree& tree) {
+  const std::vector<Overlap> overlaps = find_overlaps(tree);
+  const std::size_t named = std::min(overlaps.size(), kNamedOverlaps);
+  for (std::size_t k = 0; k < named; ++k) {
+    tree.warnings.push_back(overlap_text(tree, overlaps[k]));
+  }
+  if (overlaps.size() > named) {
+    tree.warnings.push_back(
+        fmt::format("{} more pairs of branches overlap", overlaps.size() - named));
   }
 }
 
@@ -154,6 +169,7 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
     }
     result.paths.push_back(std::move(paths[b]->path));
   }
+  warn_of_overlaps(result);
   return result;
 }
 

@@ -27,8 +27,14 @@ struct SmoothedTree {
   std::vector<std::string> warnings;
 };
 
-// Removes zero-length edges and duplicate points, joins branches at nodes of degree two, drops what
-// has no length, then smooths. Errors: no branch of positive length is left.
+// Cleans the tree (modeling/clean_tree.h) and smooths its branches (docs/centerlines.md): penalised
+// quintic splines through points and logarithms of radii, their strength chosen by restricted
+// likelihood, pooled over the tree; nodes placed by all their branches together. No given point
+// moves farther than `largest_move`; within that, bends are eased until curvature times radius is
+// below 0.8. Where that is not enough the radius gives way, down to half, and a warning names the
+// branch. Warnings also name what cleaning dropped and the vessels that overlap. A ring without
+// junctions ends at its node, where its tangent may turn. Errors: no branch of positive length is
+// left; stopped on request. O(points log points).
 Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree,
                                         const SmoothingOptions& options = {},
                                         const Progress& progress = {});
