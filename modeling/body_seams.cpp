@@ -53,19 +53,15 @@ RingShape ring_shape(const std::vector<BodyStrip>& strips, const BodyEnd& end,
     for (int j = 0; j < 6; ++j) p[index(j)] = station.local(arc.col(j));
     StripShape s;
     s.share = (part.to - part.from) / static_cast<double>(end.arcs.size());
-    // Angles grow along the ring; a strip is less than a whole turn.
-    double raw = unwrapped(angle_of(p[0]), angle);
-    if (!shape.empty() && raw < angle) raw += 2 * kPi;
-    s.seam_angle = shape.empty() ? angle_of(p[0]) : raw;
+    // Less than half a turn lies between control points of a strip: the nearest angle is meant.
+    s.seam_angle = shape.empty() ? angle_of(p[0]) : unwrapped(angle_of(p[0]), angle);
     s.seam_radius = p[0].norm();
     const Vec2 radial = p[0] / s.seam_radius;
     const Vec2 speed = 5 * (p[1] - p[0]) / s.share;
     s.seam_speed = Vec2(radial.dot(speed), -radial.y() * speed.x() + radial.x() * speed.y());
     angle = s.seam_angle;
     for (int j = 0; j < 2; ++j) {
-      double a = unwrapped(angle_of(p[index(2 + j)]), angle);
-      if (a < angle) a += 2 * kPi;
-      s.angle[index(j)] = angle = a;
+      s.angle[index(j)] = angle = unwrapped(angle_of(p[index(2 + j)]), angle);
       s.radius[index(j)] = p[index(2 + j)].norm();
     }
     shape.push_back(s);

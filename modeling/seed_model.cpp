@@ -24,6 +24,7 @@ constexpr std::array<double, 3> kForwardRadii{1.0, 2.0, 4.0};  // of the first r
 constexpr double kReachFarther = 1.6;   // times the distance at which directions are taken
 constexpr double kMergeReach = 6.0;     // radii of branch between junctions that may be merged
 constexpr double kFoldedBody = 0.02;    // Jacobian ratio of a body that counts as folded
+constexpr double kStraightened = 6.0;   // radii of body that may be straightened when it folds
 constexpr double kShortestPiece = 0.1;  // length of a body that is worth having, in radii
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -281,7 +282,8 @@ class Seeder {
       Body loft = make_lofted_body(start.body, end.body);
       if (loft.jacobian_ratio > piece.body.jacobian_ratio) piece.body = std::move(loft);
     }
-    if (piece.body.jacobian_ratio < kFoldedBody) {
+    if (piece.body.jacobian_ratio < kFoldedBody &&
+        end.along - start.along < kStraightened * radius) {
       // The path is too crooked for its radius: between its ends it goes the shortest way.
       BodyPiece direct = sweep(straight(start, end), start, end);
       if (direct.body.jacobian_ratio > piece.body.jacobian_ratio) {

@@ -533,7 +533,8 @@ bool SeedPlan::share_room(int b) {
     const double along = least + part;
     const Vec3 place = branch.at(at_end ? branch.length_mm() - along : along).head<3>();
     const double distance = branch.straight ? along : (place - node.center_mm).norm();
-    const double longest = std::max(distance, node.least_mm[k] * (1 + kRounding));
+    const double longest =
+        std::max(std::min(distance, node.caps_mm[k]), node.least_mm[k] * (1 + kRounding));
     node.spec.branches[k].longest_mm = longest;
     if (longest < node.wanted_mm[k] - kWorthTightening * node.spec.branches[k].radius_mm) {
       node.caps_mm[k] = longest;
@@ -561,6 +562,7 @@ bool SeedPlan::tighten() {
 
 void SeedPlan::reach_farther(int n, double factor) {
   nodes_[index(n)].reach *= factor;
+  nodes_[index(n)].caps_mm.clear();
   dirty_[index(n)] = 1;
 }
 
@@ -573,6 +575,7 @@ void SeedPlan::move_forward(int n, double radii) {
     mean += branch.direction;
     radius += branch.radius_mm / static_cast<double>(node.spec.branches.size());
   }
+  node.caps_mm.clear();
   node.center_mm += radii * radius * mean / static_cast<double>(node.spec.branches.size());
   dirty_[index(n)] = 1;
 }
