@@ -30,8 +30,13 @@ Result<KnotVector> KnotVector::make(int degree, std::vector<double> knots) {
     return fail({ErrorKind::kBadInput, "too few knots", "knot vector", std::to_string(knots.size()),
                  "at least 2 (degree + 1) knots are needed"});
   }
+  // One pass without a reason to stop for knots that are sound; only others are searched for the
+  // first fault. NaN fails every comparison, and finite ends bound what lies between.
+  bool sound = std::isfinite(knots.front()) && std::isfinite(knots.back());
+  for (std::size_t i = 1; i < knots.size(); ++i) sound &= knots[i - 1] <= knots[i];
+  for (std::size_t i = order; i < knots.size(); ++i) sound &= knots[i - order] < knots[i];
   std::size_t run = 1;
-  for (std::size_t i = 0; i < knots.size(); ++i) {
+  for (std::size_t i = 0; !sound && i < knots.size(); ++i) {
     if (!std::isfinite(knots[i])) {
       return fail(knot_error("knot is not finite", i, knots[i], "knots must be finite"));
     }

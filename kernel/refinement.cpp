@@ -88,40 +88,62 @@ CompactRows refinement_matrix_oslo(const KnotVector& coarse, const KnotVector& f
   return A;
 }
 
+namespace {
+
 // In blossom terms row i is f[t(i+1) .. t(i+p)] written in the coarse control points
 // f[tau(j+1) .. tau(j+p)]. Old knots tau(q+1) .. tau(q+p-nu) inside the window stay as arguments of
 // every point involved; over the other nu arguments it is a blossom of degree nu, whose knots are
-// the nu old ones before and after the fixed ones.
-CompactRows refinement_matrix(const KnotVector& coarse, const KnotVector& fine) {
-  EXPECTS(is_refinement(coarse, fine));
+// the nu old ones before and after the fixed ones. Calls visit(i, first column, entries, nu + 1).
+template <typename Visit>
+void for_each_row(const KnotVector& coarse, const KnotVector& fine, const Visit& visit) {
   const int p = coarse.degree();
   const PaddedKnots tau(coarse);
   const double* t = fine.knots().data();
-  const int total = static_cast<int>(fine.knots().size());
-
-  // old_before[k]: old knots among t(0) .. t(k - 1), equal values matched in order.
-  std::vector<int> old_before(static_cast<std::size_t>(total) + 1, 0);
+  const int rows = fine.control_point_count();
   const int coarse_total = static_cast<int>(coarse.knots().size());
-  for (int k = 0, old = 0; k < total; ++k) {
-    if (old < coarse_total && t[k] == coarse[old]) ++old;
-    old_before[static_cast<std::size_t>(k) + 1] = old;
-  }
-
-  CompactRows A(fine.control_point_count(), coarse.control_point_count(), p + 1);
   std::array<double, kMaxOrder> row;
-  for (int i = 0; i < A.rows(); ++i) {
-    const int* before = old_before.data() + i + 1;
-    const int q = before[0] - 1;                 // last old knot at or before position i
-    const int nu = p - (before[p] - before[0]);  // new knots in the window
-    const double* left = tau.at(q + 1);
-    const double* right = tau.at(q + 1 + p - nu);
-    row[0] = 1;
-    int d = 0;
-    for (int k = 1; d < nu; ++k) {
-      if (before[k] == before[k - 1]) discrete_step(left, right, t[i + k], ++d, row.data());
+  // Equal values are matched in order. `q` is the last old knot at or before position i, `ahead`
+  // the last one at or before position i + p.
+  int q = -1;
+  int ahead = -1;
+  int added = 0;  // positions of new knots among t(0) .. t(i + p) are added_at[0 .. added - 1]
+  std::vector<int> added_at;
+  added_at.reserve(fine.knots().size() - coarse.knots().size());
+  std::size_t behind = 0;  // new knots at or before position i
+  int position = 0;
+  for (int i = 0; i < rows; ++i) {
+    for (; position <= i + p; ++position) {
+      if (ahead + 1 < coarse_total && t[position] == coarse[ahead + 1]) {
+        ++ahead;
+      } else {
+        added_at.push_back(position);
+        ++added;
+      }
     }
-    A.set_row(i, q - nu, row.data(), nu + 1);
+    while (behind < added_at.size() && added_at[behind] <= i) ++behind;
+    q = i - static_cast<int>(behind);
+    const int nu = added - static_cast<int>(behind);
+    row[0] = 1;
+    if (nu > 0) {
+      const double* left = tau.at(q + 1);
+      const double* right = tau.at(q + 1 + p - nu);
+      for (int d = 1; d <= nu; ++d) {
+        const int at = added_at[behind + static_cast<std::size_t>(d) - 1];
+        discrete_step(left, right, t[at], d, row.data());
+      }
+    }
+    visit(i, q - nu, row.data(), nu + 1);
   }
+}
+
+}  // namespace
+
+CompactRows refinement_matrix(const KnotVector& coarse, const KnotVector& fine) {
+  EXPECTS(is_refinement(coarse, fine));
+  CompactRows A(fine.control_point_count(), coarse.control_point_count(), coarse.order());
+  for_each_row(coarse, fine, [&](int i, int first, const double* entries, int count) {
+    A.set_row(i, first, entries, count);
+  });
   return A;
 }
 
@@ -199,10 +221,33 @@ BSplineCurve<D> rewrite(const BSplineCurve<D>& curve, const KnotVector& knots) {
       knots, rewriting_matrix(curve.knots(), knots).template apply<D>(curve.control_points()));
 }
 
+// The rows of the matrix, applied as they come. `fine` is known to be a refinement.
 template <int D>
-BSplineCurve<D> refine(const BSplineCurve<D>& curve, const KnotVector& fine) {
-  const CompactRows A = refinement_matrix(curve.knots(), fine);
-  return BSplineCurve<D>(fine, A.apply<D>(curve.control_points()));
+BSplineCurve<D> refined(const BSplineCurve<D>& curve, KnotVector fine) {
+  const int last = curve.knots().control_point_count() - 1;
+  typename BSplineCurve<D>::ControlPoints points(D, fine.control_point_count());
+  const double* old = curve.control_points().data();
+  double* out = points.data();
+  for_each_row(curve.knots(), fine, [&](int i, int first, const double* entries, int count) {
+    double* sum = out + static_cast<std::ptrdiff_t>(D) * i;
+    if (count == 1) {
+      std::copy_n(old + static_cast<std::ptrdiff_t>(D) * first, D, sum);
+      return;
+    }
+    std::array<double, D> total{};
+    for (int k = std::max(0, -first); k < count && first + k <= last; ++k) {
+      const double* point = old + static_cast<std::ptrdiff_t>(D) * (first + k);
+      for (std::size_t c = 0; c < D; ++c) total[c] += entries[k] * point[c];
+    }
+    std::copy_n(total.begin(), D, sum);
+  });
+  return BSplineCurve<D>(std::move(fine), std::move(points));
+}
+
+template <int D>
+BSplineCurve<D> refine(const BSplineCurve<D>& curve, KnotVector fine) {
+  EXPECTS(is_refinement(curve.knots(), fine));
+  return refined(curve, std::move(fine));
 }
 
 template <int D>
@@ -240,13 +285,13 @@ BSplineSurface<D> refine(const BSplineSurface<D>& surface, const KnotVector& fin
 
 template <int D>
 Result<BSplineCurve<D>> insert_knots(const BSplineCurve<D>& curve, std::vector<double> added) {
-  const Result<KnotVector> fine = with_knots(curve.knots(), std::move(added));
+  Result<KnotVector> fine = with_knots(curve.knots(), std::move(added));
   if (!fine) return fail(fine.error());
-  return refine(curve, *fine);
+  return refined(curve, std::move(*fine));
 }
 
 #define ANGIOSPLINE_INSTANTIATE(D)                                                     \
-  template BSplineCurve<D> refine(const BSplineCurve<D>&, const KnotVector&);          \
+  template BSplineCurve<D> refine(const BSplineCurve<D>&, KnotVector);                 \
   template BSplineCurve<D> rewrite(const BSplineCurve<D>&, const KnotVector&);         \
   template BSplineSurface<D> refine(const BSplineSurface<D>&, const KnotVector&,       \
                                     const KnotVector&);                                \

@@ -38,7 +38,7 @@ CompactRows refinement_matrix_boehm(const KnotVector& coarse, const KnotVector& 
 // The same curve or surface over finer knots. Requires is_refinement in each direction.
 // D is 1 to 4. Linear in the number of fine control points.
 template <int D>
-BSplineCurve<D> refine(const BSplineCurve<D>& curve, const KnotVector& fine);
+BSplineCurve<D> refine(const BSplineCurve<D>& curve, KnotVector fine);
 template <int D>
 BSplineSurface<D> refine(const BSplineSurface<D>& surface, const KnotVector& fine_u,
                          const KnotVector& fine_v);
