@@ -32,6 +32,16 @@ class BitVolume {
   void set(int x, int y, int z) {
     words_[row(y, z) + static_cast<std::size_t>(x >> 6)] |= std::uint64_t{1} << (x & 63);
   }
+  // f(voxel) for every bit set, x fastest.
+  template <typename F>
+  void for_each_set(F&& f) const {
+    for (std::size_t w = 0; w < words_.size(); ++w)
+      for (std::uint64_t bits = words_[w]; bits != 0; bits &= bits - 1) {
+        const std::size_t at = w / words_per_row_;
+        f(Voxel{static_cast<int>(w % words_per_row_) * 64 + std::countr_zero(bits),
+                static_cast<int>(at % rows_), static_cast<int>(at / rows_)});
+      }
+  }
   // Bits of `count` voxels from x on, the first in bit 0; count <= 32.
   std::uint32_t run(int x, int y, int z, int count) const {
     const std::size_t w = row(y, z) + static_cast<std::size_t>(x >> 6);
@@ -134,6 +144,10 @@ class AdaptiveThreshold {
   bool admissible(double g) const { return g >= floor_ && std::isfinite(g); }
 
   bool is_vessel(const Voxel& v) const { return vessel_.test(v[0], v[1], v[2]); }
+  template <typename F>
+  void for_each_vessel(F&& f) const {
+    vessel_.for_each_set(f);
+  }
   void label_vessel(const Voxel& v) { vessel_.set(v[0], v[1], v[2]); }
   void label_background(const Voxel& v) { background_.set(v[0], v[1], v[2]); }
 

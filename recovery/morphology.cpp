@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <numeric>
 
 namespace angiospline {
@@ -47,6 +48,21 @@ Mask spread(const Mask& mask, bool from, int steps, Neighbours neighbours) {
   for (auto& v : out.voxels) v = v != 0;
   for (int k = 0; k < steps; ++k) out = spread_once(out, from, around);
   return out;
+}
+
+// First place in [x, count) whose class is not `foreground`, else count. Stretches of zeros, which
+// most of an image is, go eight at a time.
+int end_of_stretch(const std::uint8_t* row, int x, int count, bool foreground) {
+  if (foreground) {
+    while (x < count && row[x] != 0) ++x;
+    return x;
+  }
+  for (std::uint64_t word = 0; x + 8 <= count; x += 8) {
+    std::memcpy(&word, row + x, 8);
+    if (word != 0) break;
+  }
+  while (x < count && row[x] == 0) ++x;
+  return x;
 }
 
 // A stretch of equal voxels in one row: [begin, end).
@@ -115,14 +131,10 @@ RunComponents::RunComponents(const Mask& mask, bool foreground, Neighbours neigh
   row_begin_.push_back(0);
   for (std::size_t row = 0; row < rows; ++row) {
     const std::uint8_t* v = mask.voxels.data() + row * width_;
-    for (int x = 0; x < n[0];) {
-      if ((v[x] != 0) != foreground) {
-        ++x;
-        continue;
-      }
-      const int begin = x;
-      while (x < n[0] && (v[x] != 0) == foreground) ++x;
-      runs_.push_back({begin, x, static_cast<int>(runs_.size())});
+    for (int x = end_of_stretch(v, 0, n[0], !foreground); x < n[0];) {
+      const int end = end_of_stretch(v, x, n[0], foreground);
+      runs_.push_back({x, end, static_cast<int>(runs_.size())});
+      x = end_of_stretch(v, end, n[0], !foreground);
     }
     row_begin_.push_back(runs_.size());
   }
@@ -176,50 +188,47 @@ Mask kept(const Mask& mask, const RunComponents& components, Keep&& keep) {
   return out;
 }
 
-// Marks, in `out`, the holes of the slices of `mask` across `axis`.
-void fill_slice_holes(const Mask& mask, int axis, std::size_t largest, Filled& out) {
-  const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
-  Mask slice;
-  slice.grid.size = {mask.grid.size[static_cast<std::size_t>(u)],
-                     mask.grid.size[static_cast<std::size_t>(v)], 1};
-  slice.voxels.resize(slice.grid.voxel_count());
-  const int width = slice.grid.size[0], height = slice.grid.size[1];
-  for (int k = 0; k < mask.grid.size[static_cast<std::size_t>(axis)]; ++k) {
-    const auto in_volume = [&](int a, int b) {
-      Voxel at{};
-      at[static_cast<std::size_t>(axis)] = k;
-      at[static_cast<std::size_t>(u)] = a;
-      at[static_cast<std::size_t>(v)] = b;
-      return mask.grid.offset(at);
-    };
-    bool any = false;
-    std::size_t i = 0;
-    for (int b = 0; b < height; ++b)
-      for (int a = 0; a < width; ++a, ++i) {
-        slice.voxels[i] = mask.voxels[in_volume(a, b)];
-        any |= slice.voxels[i] != 0;
+// The background region of `start` within its slice across `axis`, 4-connected; empty if it has
+// more than `largest` voxels or reaches the edge of the slice. Cost bounded by `largest`.
+std::vector<std::size_t> enclosed_region(const Mask& mask, const Voxel& start, std::size_t axis,
+                                         std::size_t largest) {
+  std::vector<Voxel> region{start};
+  for (std::size_t k = 0; k < region.size(); ++k)
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (i == axis) continue;
+      for (const int step : {-1, 1}) {
+        Voxel n = region[k];
+        n[i] += step;
+        if (!mask.grid.contains(n)) return {};
+        if (mask[n] != 0 || std::find(region.begin(), region.end(), n) != region.end()) continue;
+        if (region.size() == largest) return {};
+        region.push_back(n);
       }
-    if (!any) continue;
-    // In a slice of its own every voxel lies on the border in z, so borders are tested here.
-    const RunComponents background(slice, false, Neighbours::kFaces6);
-    std::vector<char> open(background.list().size(), 0);
-    background.for_each_run([&](std::size_t first, std::size_t length, std::size_t c) {
-      const Voxel at = slice.grid.voxel(first);
-      if (at[1] == 0 || at[1] == height - 1 || at[0] == 0 ||
-          at[0] + static_cast<int>(length) == width)
-        open[c] = 1;
-    });
-    for (std::size_t c = 0; c < open.size(); ++c) {
-      if (background.list()[c].voxels > largest) open[c] = 1;
-      if (!open[c]) ++out.regions;
     }
-    background.for_each_run([&](std::size_t first, std::size_t length, std::size_t c) {
-      if (open[c]) return;
-      const Voxel at = slice.grid.voxel(first);
-      for (int a = 0; a < static_cast<int>(length); ++a)
-        out.mask.voxels[in_volume(at[0] + a, at[1])] = 1;
-    });
-  }
+  std::vector<std::size_t> offsets;
+  for (const Voxel& v : region) offsets.push_back(mask.grid.offset(v));
+  return offsets;
+}
+
+// Background voxels with a foreground voxel across a face, each once, in order.
+std::vector<std::size_t> outer_rim(const Mask& mask) {
+  std::vector<std::size_t> rim;
+  const Voxel n = mask.grid.size;
+  for (int z = 0; z < n[2]; ++z)
+    for (int y = 0; y < n[1]; ++y) {
+      const std::uint8_t* row = mask.voxels.data() + mask.grid.offset({0, y, z});
+      for (int x = end_of_stretch(row, 0, n[0], false); x < n[0];
+           x = end_of_stretch(row, x + 1, n[0], false))
+        for (std::size_t i = 0; i < 3; ++i)
+          for (const int step : {-1, 1}) {
+            Voxel v{x, y, z};
+            v[i] += step;
+            if (mask.grid.contains(v) && mask[v] == 0) rim.push_back(mask.grid.offset(v));
+          }
+    }
+  std::sort(rim.begin(), rim.end());
+  rim.erase(std::unique(rim.begin(), rim.end()), rim.end());
+  return rim;
 }
 
 }  // namespace
@@ -251,8 +260,8 @@ Mask close(const Mask& mask, int steps, Neighbours neighbours) {
   return out;
 }
 
-Filled fill_cavities(const Mask& mask, std::size_t largest) {
-  Filled out{mask, 0, 0};
+Filled fill_cavities(Mask mask, std::size_t largest) {
+  Filled out;
   const RunComponents background(mask, false, Neighbours::kFaces6);
   const auto is_cavity = [&](std::size_t k) {
     const Component& c = background.list()[k];
@@ -260,20 +269,35 @@ Filled fill_cavities(const Mask& mask, std::size_t largest) {
   };
   background.for_each_run([&](std::size_t first, std::size_t length, std::size_t k) {
     if (is_cavity(k))
-      std::fill_n(out.mask.voxels.begin() + static_cast<std::ptrdiff_t>(first), length, 1);
+      std::fill_n(mask.voxels.begin() + static_cast<std::ptrdiff_t>(first), length, 1);
   });
   for (std::size_t k = 0; k < background.list().size(); ++k)
     if (is_cavity(k)) {
       ++out.regions;
       out.voxels += background.list()[k].voxels;
     }
+  out.mask = std::move(mask);
   return out;
 }
 
-Filled fill_holes(const Mask& mask, std::size_t largest) {
-  Filled out{mask, 0, 0};
-  for (int axis = 0; axis < 3; ++axis) fill_slice_holes(mask, axis, largest, out);
-  out.voxels = voxel_count(out.mask) - voxel_count(mask);
+Filled fill_holes(Mask mask, std::size_t largest) {
+  Filled out;
+  std::vector<std::size_t> holes;
+  if (largest > 0)
+    for (const std::size_t at : outer_rim(mask))
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::vector<std::size_t> region =
+            enclosed_region(mask, mask.grid.voxel(at), axis, largest);
+        // Found again from each of its voxels on the rim; all are, so the lowest speaks for it.
+        if (region.empty() || *std::min_element(region.begin(), region.end()) != at) continue;
+        ++out.regions;
+        holes.insert(holes.end(), region.begin(), region.end());
+      }
+  for (const std::size_t at : holes) {
+    out.voxels += mask.voxels[at] == 0;
+    mask.voxels[at] = 1;
+  }
+  out.mask = std::move(mask);
   return out;
 }
 

@@ -31,14 +31,13 @@ struct Filled {
 
 // Cavities: 6-connected background that does not reach the border of the image, of at most
 // `largest` voxels each.
-Filled fill_cavities(const Mask& mask,
-                     std::size_t largest = std::numeric_limits<std::size_t>::max());
+Filled fill_cavities(Mask mask, std::size_t largest = std::numeric_limits<std::size_t>::max());
 
 // Holes: 4-connected background that is enclosed within one slice, of at most `largest` voxels
 // there; slices across each of the three axes, in one pass over the given mask. Closes thin
 // tunnels; the limit keeps real loops open. A cavity is enclosed in every slice, so its slices
 // count as holes too.
-Filled fill_holes(const Mask& mask, std::size_t largest);
+Filled fill_holes(Mask mask, std::size_t largest);
 
 struct Component {
   std::size_t voxels = 0;

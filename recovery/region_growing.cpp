@@ -108,9 +108,7 @@ Segmentation Grower<T>::finished() {
   GrowReport& report = result.report;
   Moments grey_values;
   const double reference = rule_.grey(report.seeds.front());
-  const Voxel n = image_.grid.size;
-  for_each({{0, 0, 0}, {n[0] - 1, n[1] - 1, n[2] - 1}}, [&](const Voxel& v) {
-    if (!rule_.is_vessel(v)) return;
+  rule_.for_each_vessel([&](const Voxel& v) {
     result.mask[v] = 1;
     grey_values.add(rule_.grey(v) - reference);
   });

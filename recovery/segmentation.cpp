@@ -238,8 +238,8 @@ Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const P
   if (report.grown.limit_reached)
     report.warnings.push_back(
         fmt::format("growing stopped after {} voxels examined", report.grown.examined));
-  Filled holes = fill_holes(grown->mask, options.largest_hole_vox);
-  Filled cavities = fill_cavities(holes.mask);
+  Filled holes = fill_holes(std::move(grown->mask), options.largest_hole_vox);
+  Filled cavities = fill_cavities(std::move(holes.mask));
   report.filled_voxels = holes.voxels + cavities.voxels;
   report.components = component_count(cavities.mask, Neighbours::kCorners26);
   if (std::optional<std::string> leak = leak_sign(cavities.mask))
