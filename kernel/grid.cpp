@@ -1,6 +1,7 @@
 #include "kernel/grid.h"
 
 #include <algorithm>
+#include <array>
 
 #include "base/contract.h"
 #include "kernel/fit.h"
@@ -59,15 +60,35 @@ LineFunction<D> line_function(int order) {
   }
 }
 
+struct ValuesAndSlopes {
+  CompactRows values;
+  CompactRows slopes;
+};
+
+ValuesAndSlopes values_and_slopes(const KnotVector& knots, const std::vector<double>& parameters) {
+  const int order = knots.order();
+  const int rows = static_cast<int>(parameters.size());
+  ValuesAndSlopes result{CompactRows(rows, knots.control_point_count(), order),
+                         CompactRows(rows, knots.control_point_count(), order)};
+  std::array<double, 2 * (KnotVector::kMaxDegree + 1)> basis;
+  int span = -1;
+  for (int r = 0; r < rows; ++r) {
+    const double t = parameters[static_cast<std::size_t>(r)];
+    span = knots.span(t, span);
+    basis_on_span(knots, span, t, 1, basis.data());
+    result.values.set_row(r, span - knots.degree(), basis.data(), order);
+    result.slopes.set_row(r, span - knots.degree(), basis.data() + order, order);
+  }
+  return result;
+}
+
 // Points and first partials in one pass over the lines.
 template <int D>
 void fill_first_partials(const BSplineSurface<D>& surface, const std::vector<double>& us,
                          const std::vector<double>& vs, LineFunction<D> line,
                          SurfaceGrid<D>& grid) {
-  const CompactRows u_values = collocation_matrix(surface.u(), us, 0);
-  const CompactRows u_slopes = collocation_matrix(surface.u(), us, 1);
-  const CompactRows v_values = collocation_matrix(surface.v(), vs, 0);
-  const CompactRows v_slopes = collocation_matrix(surface.v(), vs, 1);
+  const auto [u_values, u_slopes] = values_and_slopes(surface.u(), us);
+  const auto [v_values, v_slopes] = values_and_slopes(surface.v(), vs);
   const int count = surface.v_count();
   std::vector<double> pairs(static_cast<std::size_t>(2 * D * (count + 1)));
   std::vector<double> value(static_cast<std::size_t>(D * count));

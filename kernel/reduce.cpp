@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "base/contract.h"
+#include "kernel/fit.h"
 #include "kernel/reduce_engine.h"
 #include "kernel/refinement.h"
 #include "kernel/reshape.h"
@@ -216,7 +218,35 @@ ANGIOSPLINE_INSTANTIATE(3)
 ANGIOSPLINE_INSTANTIATE(4)
 #undef ANGIOSPLINE_INSTANTIATE
 
-#define ANGIOSPLINE_INSTANTIATE(D) \
+template <int D>
+Result<ReducedCurve<D>> fit_to_tolerance(int degree, const std::vector<double>& parameters,
+                                         const Eigen::Matrix<double, D, Eigen::Dynamic>& points,
+                                         double tolerance) {
+  const std::size_t count = parameters.size();
+  if (degree < 1 || count < static_cast<std::size_t>(degree) + 1) {
+    return fail({ErrorKind::kBadInput, "too few points", "fit to tolerance", std::to_string(count),
+                 "at least the order, " + std::to_string(degree + 1) + ", are needed"});
+  }
+  const std::size_t p = static_cast<std::size_t>(degree);
+  std::vector<double> flat(p + 1, parameters.front());
+  for (std::size_t j = 1; j + p < count; ++j) {
+    double sum = 0;
+    for (std::size_t k = j; k < j + p; ++k) sum += parameters[k];
+    flat.push_back(sum / degree);
+  }
+  flat.insert(flat.end(), p + 1, parameters.back());
+  const Result<KnotVector> knots = KnotVector::make(degree, std::move(flat));
+  if (!knots) return fail(knots.error());
+  const Result<BSplineCurve<D>> through = interpolate<D>(*knots, parameters, points);
+  if (!through) return fail(through.error());
+  ReductionOptions options;
+  options.tolerance = tolerance;
+  return reduce(*through, options);
+}
+
+#define ANGIOSPLINE_INSTANTIATE(D)                                                               \
+  template Result<ReducedCurve<D>> fit_to_tolerance(                                             \
+      int, const std::vector<double>&, const Eigen::Matrix<double, D, Eigen::Dynamic>&, double); \
   template Result<ReducedCurve<D>> reduce(const BSplineCurve<D>&, const ReductionOptions&);
 ANGIOSPLINE_INSTANTIATE(1)
 ANGIOSPLINE_INSTANTIATE(2)

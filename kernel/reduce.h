@@ -44,6 +44,15 @@ struct ReducedCurve {
 template <int D>
 Result<ReducedCurve<D>> reduce(const BSplineCurve<D>& curve, const ReductionOptions& options);
 
+// A curve of the given degree within `tolerance` of every point at its parameter, with few control
+// points: interpolation over averaged knots, then reduction (the ends are met exactly).
+// Errors: fewer points than the order, parameters that do not increase, those of reduce.
+// Reference for the knots: The NURBS Book, (9.8).
+template <int D>
+Result<ReducedCurve<D>> fit_to_tolerance(int degree, const std::vector<double>& parameters,
+                                         const Eigen::Matrix<double, D, Eigen::Dynamic>& points,
+                                         double tolerance);
+
 struct SurfaceReductionOptions {
   double tolerance = 0.0;
   int held_u0 = 1, held_u1 = 1, held_v0 = 1, held_v1 = 1;  // cross derivatives held at the sides

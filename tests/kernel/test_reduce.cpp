@@ -173,6 +173,20 @@ TEST(Reduce, RefusesAToleranceThatIsNotPositiveAndTooManyHeldDerivatives) {
   EXPECT_NE(refused.error().message().find("held"), std::string::npos);
 }
 
+TEST(FitToTolerance, ComesWithinTheToleranceOfEveryPointWithFewControlPoints) {
+  const auto parameters = spaced(0, 2 * std::numbers::pi, 400);
+  Eigen::Matrix2Xd points(2, 400);
+  for (int i = 0; i < 400; ++i) {
+    const double t = parameters[static_cast<std::size_t>(i)];
+    points.col(i) << std::cos(t), std::sin(2 * t);
+  }
+  const auto fit = fit_to_tolerance<2>(3, parameters, points, 1e-4);
+  ASSERT_TRUE(fit) << fit.error().message();
+  EXPECT_LE((evaluate(fit->curve, parameters) - points).colwise().norm().maxCoeff(), 1e-4);
+  EXPECT_LE(fit->curve.knots().control_point_count(), 40);
+  EXPECT_FALSE(fit_to_tolerance<2>(5, {0, 1}, points.leftCols<2>(), 1e-4));
+}
+
 TEST(ReduceSurface, TubeStaysWithinToleranceInBothDirections) {
   const KnotVector u = uniform_knots(5, 120);
   const KnotVector v = uniform_knots(5, 40);
