@@ -185,9 +185,9 @@ TEST(VesselsFromMask, find_the_same_tree_in_all_48_orientations) {
   Mask mask = empty_mask({90, 90, 90});
   test::paint(mask, test::RandomTree(small, random).grow());
   const auto lengths = [](const Mask& m) {
+    const CenterlineTree tree = vessels_from_mask(m).value().tree;
     std::vector<double> sorted;
-    for (const CenterlineBranch& b : vessels_from_mask(m).value().tree.branches)
-      sorted.push_back(length_mm(b));
+    for (const CenterlineBranch& b : tree.branches) sorted.push_back(length_mm(b));
     std::sort(sorted.begin(), sorted.end());
     return sorted;
   };
