@@ -36,6 +36,8 @@ constexpr int kAlternations = 12;      // between spline and largest move, in ea
 constexpr double kInsideLimit = 0.95;  // of the largest move: what alternation leaves over is less
 constexpr double kHiddenBends = 0.5;   // what a bend inside a junction counts
 constexpr double kMoveBroken = 1e9;    // what a broken move limit counts against bends
+constexpr double kLeastSpeed = 0.5;    // of the spline in its parameter, a length of chords
+constexpr int kPatience = 3;           // rounds before a strength gives in to the largest move
 constexpr double kMostStiffness = 1e4;
 constexpr double kMostForce = 1e4;
 constexpr int kDenseSamples = 12;     // of the final path, for each span of the smoothing spline
@@ -342,7 +344,11 @@ Eigen::VectorXd BranchSmoother::State::bends_of_spans(const Eigen::MatrixXd& C) 
     const double width = position.breaks()[static_cast<std::size_t>(k) + 1] - a;
     for (int i = 0; i <= kBendSamples; ++i) {
       const double t = a + width * i / kBendSamples;
-      const double bend = bend_of(curve.at(t, 1), curve.at(t, 2), std::exp(log_r.at(t)(0)));
+      const Vec3 d1 = curve.at(t, 1);
+      // A curve that nearly stands still is about to turn on the spot, between samples.
+      const double stall = kLeastSpeed / std::max(d1.norm(), 1e-6 * kLeastSpeed);
+      const double bend =
+          bend_of(d1, curve.at(t, 2), std::exp(log_r.at(t)(0))) + (stall > 1 ? stall - 1 : 0.0);
       bends(k) = std::max(bends(k), is_visible(t) ? bend : kHiddenBends * bend);
     }
   }
@@ -412,8 +418,8 @@ Eigen::MatrixXd BranchSmoother::State::follow_rules(const Eigen::MatrixXd& ends)
     }
     bends = bends_of_spans(C);
     if (judge(bends)) break;
-    if (best_excess >= kMoveBroken) {  // too stiff a spline for its limits: give in
-      strength *= 0.25;
+    if (best_excess >= kMoveBroken) {  // not there yet, or too stiff a spline for its limits
+      if (round % kPatience == kPatience - 1) strength *= 0.25;
       continue;
     }
     for (int k = 0; k < spline.span_count(); ++k) {

@@ -61,7 +61,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   check(*tree);
-  constexpr std::size_t kSmallEnoughToSmooth = 30;
+  constexpr std::size_t kSmallEnoughToSmooth = 4;
   if (tree->branches.empty() || tree->branches.size() > kSmallEnoughToSmooth) return 0;
   const auto smooth = smooth_centerlines(*tree);
   if (!smooth) return 0;
