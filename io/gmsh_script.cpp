@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -51,7 +52,10 @@ Result<void> write_gmsh_script(const Solid& solid, const std::filesystem::path& 
   text +=
       "// Twelve elements around a vessel; raise this number for a finer mesh.\n"
       "Mesh.MeshSizeFromCurvature = 12;\n";
-  if (smallest > 0) text += fmt::format("Mesh.MeshSizeMin = {:.6g};\n", smallest / 8);
+  // No smaller than around the thinnest vessel: sharp crotches would ask for dust.
+  if (smallest > 0) {
+    text += fmt::format("Mesh.MeshSizeMin = {:.6g};\n", 2 * std::numbers::pi * smallest / 16);
+  }
   return write_file(script, text);
 }
 

@@ -22,6 +22,7 @@
 #include <TopoDS_Vertex.hxx>
 #include <TopoDS_Wire.hxx>
 
+#include "modeling/boundary_model.h"
 #include "modeling/network_topology.h"
 #include "modeling/occt_bspline.h"
 #include "modeling/solid_shape.h"
@@ -52,20 +53,6 @@ FaceKind kind_of(RimKind kind) {
       break;
   }
   return FaceKind::kCap;
-}
-
-// The boundary row of a clamped surface is the control polygon of its boundary curve.
-BSplineCurve<3> boundary_curve(const BSplineSurface<3>& surface, PatchSide side) {
-  const bool along_v = side == PatchSide::kU0 || side == PatchSide::kU1;
-  const KnotVector& knots = along_v ? surface.v() : surface.u();
-  const int row = side == PatchSide::kU1   ? surface.u_count() - 1
-                  : side == PatchSide::kV1 ? surface.v_count() - 1
-                                           : 0;
-  Points3 points(3, knots.control_point_count());
-  for (int k = 0; k < knots.control_point_count(); ++k) {
-    points.col(k) = along_v ? surface.control_point(row, k) : surface.control_point(k, row);
-  }
-  return BSplineCurve<3>(knots, std::move(points));
 }
 
 // The straight curve in the (u, v) plane that runs from `a` at parameter `from` to `b` at `to`, on
@@ -177,7 +164,7 @@ class SolidBuilder {
     Vec3 area = Vec3::Zero();
     for (const LoopEdge& step : topology_.rim_loops[index(number)]) {
       const Side& side = topology_.edges[index(step.edge)].sides[0];
-      const BSplineCurve<3> curve = boundary_curve(surfaces_[index(side.patch)], side.side);
+      const BSplineCurve<3> curve = side_curve(surfaces_[index(side.patch)], side.side);
       const Points3& polygon = curve.control_points();
       for (Eigen::Index k = 0; k < polygon.cols(); ++k) points.emplace_back(polygon.col(k));
       constexpr int kChords = 16;
@@ -249,7 +236,7 @@ class SolidBuilder {
       const double gap = edge.is_join() ? gaps_mm_[e] : planes_[index(edge.rim)].distance_mm;
       const double tolerance = tolerance_for(gap);
       Handle(Geom_BSplineCurve) curve =
-          to_occt(boundary_curve(surfaces_[index(side.patch)], side.side));
+          to_occt(side_curve(surfaces_[index(side.patch)], side.side));
       if (side.from != curve->FirstParameter() || side.to != curve->LastParameter()) {
         curve->Segment(side.from, side.to);
       }
@@ -308,8 +295,7 @@ class SolidBuilder {
     builder_.NaturalRestriction(face, !is_cap);
   }
 
-  // Six times the signed volume under each component's control-point-free samples is not needed
-  // exactly: the sign decides, so the corners and centres of a coarse grid do.
+  // Only the sign of each component's volume is wanted: a coarse rule will do.
   std::vector<double> signed_volumes() const {
     std::vector<double> volumes(index(topology_.component_count), 0.0);
     std::vector<Vec3> origins(volumes.size(), Vec3::Zero());
