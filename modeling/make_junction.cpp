@@ -24,14 +24,17 @@ struct Setting {
   double area_weight = 0.5;
   double merge_deg = 5.0;
   double follow = 0.5;
+  int sweeps = 60;
 };
 
-constexpr std::array<Setting, 6> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5},
-                                          {1.0, 1.0, 0.5, 5.0, 0.0},
-                                          {1.5, 1.3, 0.5, 5.0, 0.5},
-                                          {1.5, 1.5, 0.2, 10.0, 0.0},
-                                          {0.7, 1.0, 1.0, 2.0, 0.5},
-                                          {1.0, 1.5, 0.1, 5.0, 0.5}}};
+constexpr std::array<Setting, 8> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60},
+                                          {1.0, 1.0, 0.5, 5.0, 0.0, 8},
+                                          {1.5, 1.3, 0.5, 5.0, 0.5, 60},
+                                          {1.5, 1.3, 0.5, 5.0, 0.0, 8},
+                                          {1.5, 1.5, 0.2, 10.0, 0.0, 60},
+                                          {0.7, 1.0, 1.0, 2.0, 0.5, 30},
+                                          {1.0, 1.5, 0.1, 5.0, 0.5, 60},
+                                          {2.0, 2.0, 0.5, 5.0, 0.0, 20}}};
 
 struct Attempt {
   JunctionTopology topology;
@@ -50,6 +53,7 @@ Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
   LayoutOptions layout_options;
   layout_options.area_weight = setting.area_weight;
   layout_options.follow = setting.follow;
+  layout_options.coarse_sweeps = setting.sweeps;
   const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
   SmoothedNet smooth = smooth_junction(topology, target, layout);
   JunctionQuality quality = junction_quality(topology, target, smooth.net);
