@@ -54,7 +54,7 @@ struct JunctionOptions {
 };
 
 // How far from the centre each branch's opening comes to lie, in mm; the order of the spec.
-// Errors: fewer than three branches, a radius that is not positive and finite, two branches in the
+// Errors: fewer than three branches or more than 24, a radius that is not positive and finite, two branches in the
 // same direction; each names the junction and the branches.
 Result<std::vector<double>> opening_distances_mm(const JunctionSpec& spec,
                                                  const JunctionOptions& options = {});

@@ -8,6 +8,8 @@
 
 #include <Eigen/Geometry>
 
+#include "base/contract.h"
+
 namespace angiospline {
 namespace {
 
@@ -15,7 +17,7 @@ namespace {
 constexpr double kNegligible = 25.0;
 // The ray's start is rounded over this part of the radius, so that gradients have no kinks.
 constexpr double kRoundedStart = 0.25;
-constexpr std::size_t kMostActive = 24;
+constexpr std::size_t kMostActive = 24;  // branches of one target
 
 // A number and its gradient in space.
 struct Dual {
@@ -79,6 +81,7 @@ Dual agreement(const Distance& a, const Distance& b) {
 
 JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend, double rounding)
     : branches_(std::move(branches)) {
+  EXPECTS(!branches_.empty() && branches_.size() <= kMostActive);
   const Eigen::Index n = static_cast<Eigen::Index>(branches_.size());
   widths_.resize(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -99,8 +102,8 @@ JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend,
 JunctionTarget::Value JunctionTarget::at(const Vec3& x) const {
   // Distances of all, then derivatives of those that count.
   double least = std::numeric_limits<double>::infinity();
-  std::array<double, 64> value{};
-  const std::size_t n = std::min<std::size_t>(branches_.size(), value.size());
+  std::array<double, kMostActive> value{};
+  const std::size_t n = branches_.size();
   for (std::size_t i = 0; i < n; ++i) {
     value[i] = capsule_value(branches_[i], x);
     least = std::min(least, value[i]);
@@ -108,7 +111,7 @@ JunctionTarget::Value JunctionTarget::at(const Vec3& x) const {
   std::array<std::size_t, kMostActive> active{};
   std::array<Distance, kMostActive> distance;
   std::size_t count = 0;
-  for (std::size_t i = 0; i < n && count < kMostActive; ++i) {
+  for (std::size_t i = 0; i < n; ++i) {
     if (value[i] - least > kNegligible * widths_.row(static_cast<Eigen::Index>(i)).maxCoeff())
       continue;
     active[count] = i;

@@ -22,6 +22,7 @@ struct TargetBranch {
 // stated curvature. S leaves the capsules as the distance to the other branches grows.
 class JunctionTarget {
  public:
+  // Requires 1 to 24 branches.
   JunctionTarget(std::vector<TargetBranch> branches, double blend, double rounding);
 
   const std::vector<TargetBranch>& branches() const { return branches_; }

@@ -16,6 +16,7 @@ constexpr double kLeastMargin = 0.3;    // radii
 constexpr double kLeastAngleRad = 1.0 * std::numbers::pi / 180;
 constexpr double kUnitTolerance = 1e-6;  // of a direction's length
 constexpr int kCirclePoints = 24;
+constexpr std::size_t kMostBranches = 24;  // what JunctionTarget holds
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -50,6 +51,10 @@ std::optional<Error> find_spec_defect(const JunctionSpec& spec) {
   if (spec.branches.size() < 3) {
     return Error{ErrorKind::kBadInput, "too few branches for a junction", junction_name(spec),
                  fmt::format("{}", spec.branches.size()), "a junction has three or more"};
+  }
+  if (spec.branches.size() > kMostBranches) {
+    return Error{ErrorKind::kBadInput, "too many branches for a junction", junction_name(spec),
+                 fmt::format("{}", spec.branches.size()), fmt::format("at most {}", kMostBranches)};
   }
   if (!spec.center_mm.allFinite()) {
     return Error{ErrorKind::kBadInput, "centre is not finite", junction_name(spec), {}, {}};

@@ -35,8 +35,7 @@ Eigen::MatrixXd second_difference_matrix() {
 
 TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarget& target,
                            const JunctionLayout& layout, const JunctionNet& net)
-    : topology_(topology),
-      target_(target),
+    : target_(target),
       layout_(layout),
       models_(topology.patches.size()),
       roughness_(second_difference_matrix()) {

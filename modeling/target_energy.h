@@ -31,9 +31,9 @@ struct PatchModel {
   Eigen::VectorXd gradient;
 };
 
-// The Gauss-Newton model of one patch: normals and tangent lengths are held at their current
-// values. With `from_layout` the target's foot and normal are the layout's (no evaluation of the
-// target).
+// The Gauss-Newton models of all patches: normals and tangent lengths are held at their current
+// values. Where the weight of the distance is zero the normals are the layout's and the target is
+// not evaluated.
 class TargetEnergy {
  public:
   TargetEnergy(const JunctionTopology& topology, const JunctionTarget& target,
@@ -48,7 +48,6 @@ class TargetEnergy {
  private:
   void update_patch(int patch, const JunctionNet& net, const EnergyWeights& weights);
 
-  const JunctionTopology& topology_;
   const JunctionTarget& target_;
   const JunctionLayout& layout_;
   std::vector<PatchModel> models_;
