@@ -285,7 +285,8 @@ class Seeder {
     if (piece.body.jacobian_ratio < kFoldedBody &&
         end.along - start.along < kStraightened * radius) {
       // The path is too crooked for its radius: between its ends it goes the shortest way.
-      BodyPiece direct = sweep(straight(start, end), start, end);
+      const auto [from, to] = straightened(start, end);
+      BodyPiece direct = sweep(straight(from, to), from, to);
       if (direct.body.jacobian_ratio > piece.body.jacobian_ratio) {
         piece = std::move(direct);
         outcome.warnings.push_back(
@@ -306,6 +307,18 @@ class Seeder {
     if (opening.kind != BodyLink::Kind::kOpening) return false;
     outcome.closed.push_back({opening.junction, opening.opening, rim.rim_name, rim.rim_kind});
     return true;
+  }
+
+  // The two ends of a body that folds; a free one is moved into the axis of the opening opposite.
+  static std::pair<Stop, Stop> straightened(Stop start, Stop end) {
+    const double length = std::max((end.path.point_mm - start.path.point_mm).norm(),
+                                   kShortestPiece * start.path.radius_mm);
+    if (end.path.direction.isZero() && !start.path.direction.isZero()) {
+      end.path.point_mm = start.path.point_mm + length * start.path.direction;
+    } else if (start.path.direction.isZero() && !end.path.direction.isZero()) {
+      start.path.point_mm = end.path.point_mm - length * end.path.direction;
+    }
+    return {start, end};
   }
 
   static Eigen::Matrix4Xd straight(const Stop& start, const Stop& end) {
