@@ -77,7 +77,8 @@ Result<ReducedSurface<D>> reduce(const BSplineSurface<D>& surface,
                                  const SurfaceReductionOptions& options);
 
 // For each interior knot (index degree + 1 .. control_point_count - 1) the distance, in the largest
-// coefficient, from the spline to those without this copy of the knot. `stride` numbers a control
+// coefficient, from the spline to those without this copy of the knot (of a multiple one, the
+// lightest copy first, each weighed with the ones before it gone). `stride` numbers a control
 // point in groups of `group` that are measured in the Euclidean norm.
 std::vector<double> knot_weights(const KnotVector& knots, const double* points, int stride,
                                  int group);

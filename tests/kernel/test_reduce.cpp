@@ -86,6 +86,9 @@ TEST(Reduce, OfARefinedCurveFindsTheOriginalKnots) {
     const BSplineCurve<3> curve = random_curve<3>(random, knots);
     std::vector<double> added;
     for (int k = 0; k < 12; ++k) added.push_back(random.uniform(knots.first(), knots.last()));
+    for (const double t : knots.breakpoints()) {  // and some old knots once more
+      if (t > knots.first() && t < knots.last() && random.below(2) == 0) added.push_back(t);
+    }
     const auto fine = insert_knots(curve, added);
     ASSERT_TRUE(fine);
     ReductionOptions options;
