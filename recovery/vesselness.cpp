@@ -157,7 +157,7 @@ Result<std::vector<Vec3>> find_seeds(const AnyImage& image, const SeedSearchOpti
                    [](const Part& a, const Part& b) { return a.total > b.total; });
   std::vector<Vec3> seeds;
   for (const Part& p : found)
-    if (std::ssize(seeds) < options.most && p.total >= 0.1 * found.front().total)
+    if (std::ssize(seeds) < options.most && p.total >= 0.03 * found.front().total)
       seeds.push_back(small.grid.world_mm(small.grid.voxel(p.best)));
   return seeds;
 }
