@@ -9,6 +9,7 @@
 #include "cli/model_stages.h"
 #include "io/centerline_export.h"
 #include "io/certificate_json.h"
+#include "io/report_html.h"
 
 namespace angiospline::cli {
 namespace {
@@ -83,6 +84,23 @@ Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder&
   return Recovered{std::move(segmented->report), std::move(*vessels), std::move(*model)};
 }
 
+// The page a person looks at, with projections of the image; the image is read once more for them.
+Result<void> write_recovery_report(const fs::path& path, const RecoverArguments& arguments,
+                                   const Recovered& recovered, const Certificate& certificate,
+                                   const std::vector<std::string>& files, const Stopwatch& watch) {
+  const auto file = read_image(arguments.segment.image);
+  if (!file) return fail(file.error());
+  auto mesh = tessellate(recovered.model.network);
+  if (!mesh) return fail(mesh.error());
+  ReportExtras extras;
+  extras.certificate = certificate;
+  extras.images = projections(file->image, recovered.vessels.tree,
+                              arguments.segment.dark ? Polarity::kDark : Polarity::kBright);
+  extras.seconds = watch.laps();
+  extras.files = files;
+  return write_report(path, recovered.model, mesh->mesh, extras);
+}
+
 }  // namespace
 
 int run_recover(const RecoverArguments& arguments) {
@@ -105,6 +123,14 @@ int run_recover(const RecoverArguments& arguments) {
     files.push_back((**folder / name).string());
   }
   for (const fs::path& path : paths) files.push_back(path.string());
+  const fs::path report = **folder / "report.html";
+  if (const auto written =
+          write_recovery_report(report, arguments, *recovered, *certificate, files, watch);
+      !written) {
+    return report_error(written.error());
+  }
+  files.push_back(report.string());
+  watch.lap("report");
   if (arguments.json) {
     Json json = model_json(recovered->model);
     json["segment"] = segmentation_json(recovered->segment);

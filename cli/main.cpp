@@ -106,7 +106,7 @@ void add_seed(CLI::App& app, CommandLine& line) {
   command->add_option("TREE", a.tree, "centerline file: .swc .csv ...")->required();
   command
       ->add_option("-o,--output", a.outputs,
-                   "files to write, by suffix: .step .iges .brep .glb .stl .vtp .json")
+                   "files to write, by suffix: .step .iges .brep .glb .stl .vtp .vtu .json .html")
       ->required();
   command->add_option("--unit", a.reading.unit, "unit of the file: mm, cm, m or um")
       ->check(CLI::IsMember({"mm", "cm", "m", "um"}));

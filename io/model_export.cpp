@@ -10,8 +10,10 @@
 #include "io/glb_file.h"
 #include "io/iges_file.h"
 #include "io/model_file.h"
+#include "io/report_html.h"
 #include "io/stl_file.h"
 #include "io/vtk_file.h"
+#include "modeling/certificate.h"
 #include "modeling/tessellate_solid.h"
 
 namespace angiospline {
@@ -19,14 +21,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class Format { kNative, kStep, kIges, kBrep, kGlb, kStl, kVtk };
+enum class Format { kNative, kStep, kIges, kBrep, kGlb, kStl, kVtk, kReport };
 
 struct Suffix {
   const char* text;
   Format format;
 };
 
-constexpr std::array<Suffix, 10> kSuffixes{{{".json", Format::kNative},
+constexpr std::array<Suffix, 11> kSuffixes{{{".json", Format::kNative},
                                             {".step", Format::kStep},
                                             {".stp", Format::kStep},
                                             {".iges", Format::kIges},
@@ -35,7 +37,8 @@ constexpr std::array<Suffix, 10> kSuffixes{{{".json", Format::kNative},
                                             {".glb", Format::kGlb},
                                             {".stl", Format::kStl},
                                             {".vtp", Format::kVtk},
-                                            {".vtu", Format::kVtk}}};
+                                            {".vtu", Format::kVtk},
+                                            {".html", Format::kReport}}};
 
 std::string lower_suffix(const fs::path& path) {
   std::string suffix = path.extension().string();
@@ -88,6 +91,15 @@ Result<void> write_triangles(const TriangleMesh& mesh, const std::string& name,
   }
 }
 
+Result<void> write_measured_report(const fs::path& path, const Model& model,
+                                   const TriangleMesh& mesh, const Progress& progress) {
+  auto certificate = certify(model.network, {}, progress);
+  if (!certificate) return fail(certificate.error());
+  ReportExtras extras;
+  extras.certificate = std::move(*certificate);
+  return write_report(path, model, mesh, extras);
+}
+
 }  // namespace
 
 std::string exported_suffixes() {
@@ -135,13 +147,14 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
         solid = std::move(*made);
       }
       written = write_solid(*solid, model.name, paths[i], options, progress);
-    } else if (needs_triangles(format)) {
+    } else if (needs_triangles(format) || format == Format::kReport) {
       if (!mesh) {
         auto made = tessellate(model.network, options.tessellation, progress);
         if (!made) return fail(made.error());
         mesh = std::move(made->mesh);
       }
-      written = write_triangles(*mesh, model.name, paths[i]);
+      written = format == Format::kReport ? write_measured_report(paths[i], model, *mesh, progress)
+                                          : write_triangles(*mesh, model.name, paths[i]);
     } else {
       written = write_model(paths[i], model);
     }
@@ -197,7 +210,7 @@ Result<AnyModel> read_any_model(const fs::path& path, const Progress& progress) 
     if (!result) return fail(result.error());
     return AnyModel(std::move(*result));
   };
-  if (!format || *format == Format::kGlb) {
+  if (!format || *format == Format::kGlb || *format == Format::kReport) {
     return fail(unknown_suffix(path, ErrorKind::kBadInput,
                                "one of .json .step .stp .iges .igs .brep .stl .vtp .vtu"));
   }

@@ -27,9 +27,9 @@ std::string exported_suffixes();
 Result<void> check_export_target(const std::filesystem::path& path);
 
 // Writes the model to every path: .json (native), .step .stp, .iges .igs, .brep, .glb, .stl, .vtp,
-// .vtu. The solid and the triangles are made once, and only if a path needs them. Each file appears
-// whole or not at all; targets are checked before the first is written. Errors: those of the
-// writers.
+// .vtu, .html (the report, with its facts beside it). The solid and the triangles are made once,
+// and only if a path needs them. Each file appears whole or not at all; targets are checked before
+// the first is written. Errors: those of the writers.
 Result<void> export_model(const Model& model, const std::vector<std::filesystem::path>& paths,
                           const ExportOptions& options = {}, const Progress& progress = {});
 

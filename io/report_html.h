@@ -11,7 +11,8 @@
 #include "modeling/certificate.h"
 #include "modeling/model.h"
 #include "modeling/triangle_mesh.h"
-#include "recovery/image.h"
+#include "recovery/any_image.h"
+#include "recovery/region_growing.h"
 
 namespace angiospline {
 
@@ -28,9 +29,8 @@ struct ReportImage {
 // The maximum (`bright`) or minimum intensity projections of an image along its three axes, with
 // the tree's centerlines. Grey runs from the 1st to the 99.9th percentile of the picture. Titles
 // name the axis.
-enum class Vessels { kBright, kDark };
-std::vector<ReportImage> projections(const Image<float>& image, const CenterlineTree& tree,
-                                     Vessels vessels = Vessels::kBright);
+std::vector<ReportImage> projections(const AnyImage& image, const CenterlineTree& tree,
+                                     Polarity vessels = Polarity::kBright);
 
 // What a report shows besides the model; all of it may be left out.
 struct ReportExtras {

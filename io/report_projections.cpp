@@ -61,8 +61,9 @@ std::vector<std::uint8_t> grey_of(const std::vector<float>& values) {
   return grey;
 }
 
-ReportImage project(const Image<float>& image, const CenterlineTree& tree, int through,
-                    Vessels vessels) {
+template <typename T>
+ReportImage project(const Image<T>& image, const CenterlineTree& tree, int through,
+                    Polarity vessels) {
   const ImageGrid& grid = image.grid;
   const Hanging h = hang(grid, through);
   const auto size = [&](int axis) { return grid.size[static_cast<std::size_t>(axis)]; };
@@ -74,7 +75,7 @@ ReportImage project(const Image<float>& image, const CenterlineTree& tree, int t
   const char axis = ends[0] == 'R' || ends[0] == 'L'   ? 'x'
                     : ends[0] == 'A' || ends[0] == 'P' ? 'y'
                                                        : 'z';
-  picture.title = std::string(vessels == Vessels::kBright ? "maximum" : "minimum") +
+  picture.title = std::string(vessels == Polarity::kBright ? "maximum" : "minimum") +
                   " intensity along " + axis + ", with centerlines";
   const auto column = [&](int voxel) { return h.flip_across ? picture.width - 1 - voxel : voxel; };
   const auto row = [&](int voxel) { return h.flip_down ? picture.height - 1 - voxel : voxel; };
@@ -89,8 +90,8 @@ ReportImage project(const Image<float>& image, const CenterlineTree& tree, int t
         const auto at = static_cast<std::size_t>(row(v[static_cast<std::size_t>(h.down)])) *
                             static_cast<std::size_t>(picture.width) +
                         static_cast<std::size_t>(column(v[static_cast<std::size_t>(h.across)]));
-        const float value = image[v];
-        const bool better = vessels == Vessels::kBright ? value > best[at] : value < best[at];
+        const auto value = static_cast<float>(image[v]);
+        const bool better = vessels == Polarity::kBright ? value > best[at] : value < best[at];
         if (seen[at] == 0 || better) best[at] = value;
         seen[at] = 1;
       }
@@ -113,11 +114,14 @@ ReportImage project(const Image<float>& image, const CenterlineTree& tree, int t
 
 }  // namespace
 
-std::vector<ReportImage> projections(const Image<float>& image, const CenterlineTree& tree,
-                                     Vessels vessels) {
+std::vector<ReportImage> projections(const AnyImage& image, const CenterlineTree& tree,
+                                     Polarity vessels) {
   std::vector<ReportImage> pictures;
-  if (image.voxels.empty()) return pictures;
-  for (const int through : {1, 0, 2}) pictures.push_back(project(image, tree, through, vessels));
+  if (grid_of(image).voxel_count() == 0) return pictures;
+  for (const int through : {1, 0, 2}) {
+    pictures.push_back(std::visit(
+        [&](const auto& typed) { return project(typed, tree, through, vessels); }, image));
+  }
   return pictures;
 }
 

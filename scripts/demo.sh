@@ -17,7 +17,7 @@ say "2. From the image to a CAD model: mask, skeleton, graph, surfaces, solid"
 
 say "3. From centerlines with radii to a CAD model: a small tree of vessels"
 "$program" seed "$here/samples/figure_7_18.swc" \
-  -o "$out/tree.step" "$out/tree.iges" "$out/tree.glb" "$out/tree.stl" "$out/tree.json"
+  -o "$out/tree.step" "$out/tree.iges" "$out/tree.glb" "$out/tree.stl" "$out/tree.json" "$out/tree.html"
 
 say "4. Both solids measured, from the files a CAD program will open"
 for file in "$out/bifurcation/model.step" "$out/tree.step"; do
@@ -28,8 +28,9 @@ done
 say "Look at these"
 cat <<TEXT
   $out/tree.step                  the tree as a solid for CAD and CFD: FreeCAD, gmsh, CATIA, SolidWorks ...
-  $out/tree.glb                   the same for a browser or viewer (drag it into https://gltf-viewer.donmccurdy.com)
+  $out/tree.html                  the same on a page: 3-D view, plots, tables; open it in a browser
+  $out/tree.glb                   the same for glTF viewers (Blender, Windows 3D Viewer, three.js ...)
   $out/bifurcation/model.step     the solid recovered from the image
-  $out/bifurcation/model.glb      the same for a viewer
+  $out/bifurcation/report.html    the same on a page, with projections of the image
   $out/bifurcation/mask.nrrd      what was segmented; open it with bifurcation.nii.gz in 3D Slicer
 TEXT
