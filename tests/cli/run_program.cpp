@@ -15,9 +15,16 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result + "'";
+  std::string result(1, '\'');
+  for (const char c : text) {
+    if (c == '\'') {
+      result.append("'\\''");
+    } else {
+      result.push_back(c);
+    }
+  }
+  result.push_back('\'');
+  return result;
 }
 
 std::string contents(const fs::path& path) {
@@ -54,11 +61,12 @@ std::vector<std::string> TemporaryFolder::files() const {
   return names;
 }
 
-Run run_angiospline(const std::vector<std::string>& arguments) {
+ProgramRun run_angiospline(const std::vector<std::string>& arguments) {
   const TemporaryFolder talk;
   std::string command = quoted(ANGIOSPLINE_PROGRAM);
-  for (const std::string& argument : arguments) command += " " + quoted(argument);
-  command += " >" + quoted(talk / "out") + " 2>" + quoted(talk / "err") + " </dev/null";
+  for (const std::string& argument : arguments) command.append(" ").append(quoted(argument));
+  command.append(" >").append(quoted(talk / "out"));
+  command.append(" 2>").append(quoted(talk / "err")).append(" </dev/null");
   const int status = std::system(command.c_str());
   const int exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return {exit_code, contents(talk / "out"), contents(talk / "err")};

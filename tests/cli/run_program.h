@@ -7,7 +7,7 @@
 
 namespace angiospline::test {
 
-struct Run {
+struct ProgramRun {
   int exit_code = -1;
   std::string out;
   std::string err;
@@ -31,7 +31,7 @@ class TemporaryFolder {
 };
 
 // The program with these arguments; waits for its end.
-Run run_angiospline(const std::vector<std::string>& arguments);
+ProgramRun run_angiospline(const std::vector<std::string>& arguments);
 
 // The first lines of a text: what should be one line ends with its only line feed.
 bool is_one_line(const std::string& text);

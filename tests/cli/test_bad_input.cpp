@@ -26,7 +26,8 @@ TEST_P(SeedRefuses, WithOneLineAndLeavesNoFile) {
   const BadTree& bad = GetParam();
   const TemporaryFolder folder;
   const std::string input = folder.write(bad.file, bad.text);
-  const Run run = run_angiospline({"seed", input, "-o", folder / "out.step", folder / "out.glb"});
+  const ProgramRun run =
+      run_angiospline({"seed", input, "-o", folder / "out.step", folder / "out.glb"});
   EXPECT_EQ(run.exit_code, 2) << run.err;
   EXPECT_TRUE(is_one_line(run.err)) << run.err;
   EXPECT_EQ(run.out, "");
@@ -78,13 +79,13 @@ INSTANTIATE_TEST_SUITE_P(
                 {"tree.csv:3", "-1"}},
         BadTree{"CsvEmpty", "tree.csv", "", {"tree.csv"}},
         BadTree{"UnknownSuffix", "tree.docx", "1 3 0 0 0 1 -1\n", {"tree.docx"}}),
-    [](const testing::TestParamInfo<BadTree>& info) { return std::string(info.param.name); });
+    [](const testing::TestParamInfo<BadTree>& tested) { return std::string(tested.param.name); });
 
 constexpr const char* kGoodTree = "1 3 0 0 0 2 -1\n2 3 0 0 10 2 1\n3 3 0 0 20 2 2\n";
 
 TEST(Seed, RefusesAMissingFile) {
   const TemporaryFolder folder;
-  const Run run = run_angiospline({"seed", folder / "none.swc", "-o", folder / "out.step"});
+  const ProgramRun run = run_angiospline({"seed", folder / "none.swc", "-o", folder / "out.step"});
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_TRUE(is_one_line(run.err)) << run.err;
   EXPECT_NE(run.err.find("none.swc"), std::string::npos);
@@ -96,7 +97,7 @@ TEST(Seed, RefusesATargetThatCannotBeWrittenAndKeepsNothing) {
   const std::string input = folder.write("tree.swc", kGoodTree);
   for (const char* name :
        {"out.step", "out.iges", "out.brep", "out.glb", "out.stl", "out.vtp", "out.json"}) {
-    const Run run =
+    const ProgramRun run =
         run_angiospline({"seed", input, "-o", folder / ("missing/" + std::string(name))});
     EXPECT_EQ(run.exit_code, 2) << name << ": " << run.err;
     EXPECT_TRUE(is_one_line(run.err)) << run.err;
@@ -108,7 +109,8 @@ TEST(Seed, RefusesATargetThatCannotBeWrittenAndKeepsNothing) {
 TEST(Seed, RefusesAnOutputSuffixItDoesNotKnowBeforeAnyWork) {
   const TemporaryFolder folder;
   const std::string input = folder.write("tree.swc", kGoodTree);
-  const Run run = run_angiospline({"seed", input, "-o", folder / "out.step", folder / "out.dwg"});
+  const ProgramRun run =
+      run_angiospline({"seed", input, "-o", folder / "out.step", folder / "out.dwg"});
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_TRUE(is_one_line(run.err)) << run.err;
   EXPECT_NE(run.err.find("out.dwg"), std::string::npos);
@@ -125,7 +127,7 @@ TEST(Command, RefusesUnknownWordsWithOneLine) {
            {"phantom", "teapot", "-o", "x.mha"},
            {"recover", "a.mha", "--seed", "1,2", "-o", "out"},
            {"recover", "a.mha", "--seed", "1,2,x", "-o", "out"}}) {
-    const Run run = run_angiospline(arguments);
+    const ProgramRun run = run_angiospline(arguments);
     EXPECT_EQ(run.exit_code, 2) << run.err;
     EXPECT_TRUE(is_one_line(run.err)) << run.err;
   }
@@ -134,7 +136,7 @@ TEST(Command, RefusesUnknownWordsWithOneLine) {
 TEST(Command, HelpOfEverySubcommandGoesToStandardOutput) {
   for (const char* verb :
        {"recover", "seed", "segment", "thin", "graph", "check", "compare", "convert", "phantom"}) {
-    const Run run = run_angiospline({verb, "--help"});
+    const ProgramRun run = run_angiospline({verb, "--help"});
     EXPECT_EQ(run.exit_code, 0);
     EXPECT_NE(run.out.find("-h,--help"), std::string::npos);
     EXPECT_EQ(run.err, "");
@@ -145,7 +147,7 @@ class RecoverRefuses : public testing::Test {
  protected:
   // A dark cube with one bright bar, 24 x 24 x 24.
   void SetUp() override {
-    const Run run =
+    const ProgramRun run =
         run_angiospline({"phantom", "cylinder", "-o", folder_ / "image.nrrd", "--snr", "8"});
     ASSERT_EQ(run.exit_code, 0) << run.err;
   }
@@ -153,7 +155,7 @@ class RecoverRefuses : public testing::Test {
   void expect_refusal(const std::vector<std::string>& arguments,
                       const std::vector<std::string>& words) {
     const std::vector<std::string> before = folder_.files();
-    const Run run = run_angiospline(arguments);
+    const ProgramRun run = run_angiospline(arguments);
     EXPECT_EQ(run.exit_code, 2) << run.err;
     EXPECT_TRUE(is_one_line(run.err)) << run.err;
     for (const std::string& word : words) {
@@ -213,7 +215,7 @@ TEST_F(RecoverRefuses, AFolderThatCannotBeMade) {
 }
 
 TEST_F(RecoverRefuses, MasksThatAreEmptyWhenThinned) {
-  const Run zero = run_angiospline(
+  const ProgramRun zero = run_angiospline(
       {"segment", folder_ / "image.nrrd", "--seed-voxel", "1,1,1", "-o", folder_ / "mask.nrrd"});
   EXPECT_EQ(zero.exit_code, 2) << zero.err;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "mask.nrrd"));
