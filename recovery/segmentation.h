@@ -64,7 +64,8 @@ struct Segmented {
 //   M          2, or less: v - M sigma_v stays above the middle of v and b; at least 1
 //   background b + 2 sigma_b, within 0.2 to 0.4 of the way from b to v
 //   level      b is the `background_level` of GrowOptions
-// Errors: those of grow_region; no seed given and nothing tubular found.
+// Errors: those of grow_region; a given seed around which no vessel stands out (unless N, M and the
+// background are all given); no seed given and nothing tubular found.
 Result<Segmented> segment(AnyImage image, const SegmentOptions& options = {},
                           const Progress& progress = {});
 
