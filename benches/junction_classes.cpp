@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include <Eigen/Geometry>
+#include <fmt/core.h>
 
 namespace angiospline {
 namespace {
@@ -36,7 +37,7 @@ JunctionSpec spec_of(std::vector<Vec3> directions, const std::vector<double>& ra
   spec.name = "j";
   for (std::size_t b = 0; b < directions.size(); ++b) {
     JunctionBranch branch;
-    branch.name.assign("b").append(std::to_string(b));
+    branch.name = fmt::format("b{}", b);
     branch.direction = (turn * directions[b]).normalized();
     branch.radius_mm = radii[b];
     spec.branches.push_back(std::move(branch));
