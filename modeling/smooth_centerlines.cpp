@@ -167,6 +167,13 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
                       "wall may fold there",
                       branches[b].name, paths[b]->sharpest_bend));
     }
+    if (!paths[b]->path.control_points().allFinite()) {
+      return fail({ErrorKind::kBadInput,
+                   "the branch cannot be smoothed",
+                   branches[b].name,
+                   {},
+                   "its coordinates and radii are too far apart in size for its numbers"});
+    }
     result.paths.push_back(std::move(paths[b]->path));
   }
   warn_of_overlaps(result);
