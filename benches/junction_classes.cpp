@@ -34,9 +34,10 @@ JunctionSpec spec_of(std::vector<Vec3> directions, const std::vector<double>& ra
       Eigen::Vector4d(random.gaussian(), random.gaussian(), random.gaussian(), random.gaussian())
           .normalized());
   JunctionSpec spec;
-  spec.name = "j";
+  spec.name = std::string("j");
   for (std::size_t b = 0; b < directions.size(); ++b) {
     JunctionBranch branch;
+    branch.name = fmt::format("b{}", b);
     branch.name = fmt::format("b{}", b);
     branch.direction = (turn * directions[b]).normalized();
     branch.radius_mm = radii[b];
