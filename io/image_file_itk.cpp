@@ -8,6 +8,18 @@
 #include <new>
 
 #include <fmt/format.h>
+// Debian's ITK knows the one compiler it was built with; clang passes for it in the features asked.
+#if defined(__clang__)
+#pragma push_macro("__clang__")
+#pragma push_macro("__GNUC__")
+#undef __clang__
+#undef __GNUC__
+#define __GNUC__ 12
+#include <itk_compiler_detection.h>
+#pragma pop_macro("__GNUC__")
+#pragma pop_macro("__clang__")
+#endif
+
 #include <itkGDCMImageIO.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
