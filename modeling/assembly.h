@@ -1,6 +1,7 @@
 // Junctions and bodies put together: one pool of control points, joins, rims and names.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,7 @@ struct BodyPiece {
   BodyEnd end;
   BodyLink start_link;
   BodyLink end_link;
+  std::optional<BSplineCurve<4>> path;  // the axis and radius over [0, 1], where it was swept
 };
 
 // An opening without a body: it is closed by a plane cap of its own.

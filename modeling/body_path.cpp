@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -15,7 +16,8 @@ namespace {
 constexpr int kDegree = 5;
 constexpr double kSlack = 1e-4;  // bending stiffness where nothing asks for more
 constexpr double kStiff = 4.0;   // near held ends: a turn by delta bends by about delta / radius
-constexpr int kRounds = 12;      // of stiffening bends that are too tight
+constexpr double kFirstStep = 0.0125;
+constexpr int kRounds = 24;  // of stiffening bends that are too tight
 constexpr double kSpansPerRadius = 1.5;
 
 struct Rail {
@@ -92,12 +94,20 @@ Bend bend_at(const BSplineCurve<4>& curve, double t) {
 
 class PathFit {
  public:
-  PathFit(Rail rail, const PathEnd& start, const PathEnd& end)
-      : rail_(std::move(rail)), start_(start), end_(end), knots_(make_knots()) {
+  PathFit(Rail rail, const PathEnd& start, const PathEnd& end, double largest_move)
+      : rail_(std::move(rail)),
+        start_(start),
+        end_(end),
+        largest_move_(largest_move),
+        knots_(make_knots()),
+        course_(knots_, Eigen::Matrix4Xd::Zero(4, knots_.control_point_count())) {
     const std::size_t spans = knots_.breakpoints().size() - 1;
     stiffness_.assign(spans, kSlack);
     resample(rail_, 4 * static_cast<int>(spans) + 4);
+    course_ = solve();
   }
+
+  const BSplineCurve<4>& course() const { return course_; }
 
   // The target as a spline, then the correction that meets the ends: a stiff beam that starts from
   // what is missing there and dies out, so that bends of the target itself are not straightened.
@@ -123,11 +133,16 @@ class PathFit {
   }
 
   // Bends at the ends and quarters of every span; the tightest one of a span stiffens it and its
-  // neighbours. False when no bend is too tight.
+  // neighbours, unless the path has left its target there already: then the radius has to give
+  // way. False when nothing was stiffened.
   bool stiffen(const BSplineCurve<4>& curve) {
+    const std::vector<char> moved = moved_spans(curve);
+    // Small steps where the limit must not be overshot; large ones even the stiffness out.
+    const double growth = std::isinf(largest_move_) ? 4 : 2;
     std::vector<double> raised = stiffness_;
     bool any = false;
     for (std::size_t s = 0; s < stiffness_.size(); ++s) {
+      if (moved[s] != 0) continue;
       double tightest = 0;
       for (const double f : {0.0, 0.25, 0.5, 0.75, 1.0}) {
         const Bend bend =
@@ -138,7 +153,7 @@ class PathFit {
       any = true;
       const std::size_t low = s >= 2 ? s - 2 : 0;
       for (std::size_t k = low; k < std::min(s + 3, stiffness_.size()); ++k) {
-        raised[k] = std::max(raised[k], std::max(stiffness_[k] * 4, 0.05));
+        raised[k] = std::max(raised[k], std::max(stiffness_[k] * growth, kFirstStep * growth));
       }
     }
     stiffness_ = std::move(raised);
@@ -148,6 +163,19 @@ class PathFit {
   double spans() const { return static_cast<double>(stiffness_.size()); }
 
  private:
+  // The spans near which the curve lies farther from its unstiffened course than it may.
+  std::vector<char> moved_spans(const BSplineCurve<4>& curve) const {
+    std::vector<char> moved(stiffness_.size(), 0);
+    for (std::size_t i = 0; i < rail_.parameters.size(); ++i) {
+      const double t = rail_.parameters[i];
+      const double away = (curve.at(t) - course_.at(t)).head<3>().norm();
+      if (away <= largest_move_ * rail_.points(3, static_cast<Eigen::Index>(i))) continue;
+      const auto s = std::min(stiffness_.size() - 1, static_cast<std::size_t>(t * spans()));
+      for (std::size_t k = s >= 2 ? s - 2 : 0; k < std::min(s + 3, moved.size()); ++k) moved[k] = 1;
+    }
+    return moved;
+  }
+
   KnotVector make_knots() const {
     const double radii = rail_.length_mm / rail_.mean_radius_mm;
     const int spans = std::max(2, static_cast<int>(std::ceil(kSpansPerRadius * radii)));
@@ -169,8 +197,10 @@ class PathFit {
   Rail rail_;
   PathEnd start_;
   PathEnd end_;
+  double largest_move_;
   KnotVector knots_;
   std::vector<double> stiffness_;
+  BSplineCurve<4> course_;  // before any stiffening
 };
 
 // Lowers radius control points where the bend is too tight for the radius.
@@ -201,13 +231,10 @@ double tightest(const std::vector<Bend>& bends) {
   return largest;
 }
 
-}  // namespace
-
-BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end) {
-  EXPECTS(target.cols() >= 2);
-  EXPECTS(start.radius_mm > 0 && end.radius_mm > 0);
-  PathFit fit(make_rail(target, start, end), start, end);
-  BSplineCurve<4> curve = fit.solve();
+BodyPath fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end,
+                    double largest_move) {
+  PathFit fit(rail, start, end, largest_move);
+  BSplineCurve<4> curve = fit.course();
   for (int round = 0; round < kRounds && fit.stiffen(curve); ++round) curve = fit.solve();
 
   const int samples = static_cast<int>(4 * fit.spans());
@@ -220,6 +247,19 @@ BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, con
   }
   path.largest_bend = tightest(bends_of(path.curve, samples));
   return path;
+}
+
+}  // namespace
+
+BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end) {
+  EXPECTS(target.cols() >= 2);
+  EXPECTS(start.radius_mm > 0 && end.radius_mm > 0);
+  const Rail rail = make_rail(target, start, end);
+  for (const double largest_move : {kLargestPathMove, 1.0}) {
+    BodyPath path = fit_within(rail, start, end, largest_move);
+    if (path.narrowed <= kMostNarrowed) return path;
+  }
+  return fit_within(rail, start, end, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace angiospline

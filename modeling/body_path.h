@@ -23,10 +23,16 @@ struct BodyPath {
 // Bends tighter than this (curvature times radius) are relaxed; 1 is where a tube folds.
 inline constexpr double kTightestBend = 0.75;
 
+// Stiffening may move the path by so many radii, unless the radius would be narrowed by more than
+// the share below: then by one radius, then by as much as it takes.
+inline constexpr double kLargestPathMove = 0.3;
+inline constexpr double kMostNarrowed = 0.4;
+
 // Follows `target` (columns x, y, z, radius in mm; at least two, not all in one place) between the
 // ends. What the target misses at the ends is made up by an elastic correction that dies out within
-// some four radii; bends tighter than kTightestBend are stiffened until they open. If a bend stays
-// too tight the radius is narrowed there to kTightestBend / curvature.
+// some four radii; bends tighter than kTightestBend are stiffened until they open or the path has
+// moved by about kLargestPathMove radii. If a bend stays too tight the radius is narrowed there to
+// kTightestBend / curvature.
 // Linear in the number of columns and in length / radius.
 BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end);
 

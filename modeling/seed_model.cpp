@@ -21,11 +21,13 @@ namespace {
 
 constexpr int kJunctionRounds = 6;  // of building, changing the plan of what failed, building again
 constexpr std::array<double, 3> kForwardRadii{1.0, 2.0, 4.0};  // of the first rounds, each on top
-constexpr double kReachFarther = 1.6;   // times the distance at which directions are taken
-constexpr double kMergeReach = 6.0;     // radii of branch between junctions that may be merged
-constexpr double kFoldedBody = 0.02;    // Jacobian ratio of a body that counts as folded
-constexpr double kStraightened = 6.0;   // radii of body that may be straightened when it folds
-constexpr double kShortestPiece = 0.1;  // length of a body that is worth having, in radii
+constexpr double kReachFarther = 1.6;       // times the distance at which directions are taken
+constexpr double kMergeReach = 6.0;         // radii of branch between junctions that may be merged
+constexpr double kFarFromCenterline = 0.5;  // radii that are worth a warning
+constexpr int kMergePasses = 3;             // of merging junctions between which the body folds
+constexpr double kFoldedBody = 0.02;        // Jacobian ratio of a body that counts as folded
+constexpr double kStraightened = 6.0;       // radii of body that may be straightened when it folds
+constexpr double kShortestPiece = 0.1;      // length of a body that is worth having, in radii
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
@@ -74,9 +76,12 @@ class Seeder {
       : tree_(tree), options_(options), progress_(progress), plan_(tree, options.junction) {}
 
   Result<Model> run() {
-    if (!build_junctions()) return fail(cancelled("junctions"));
-    number_junctions();
-    if (!build_bodies()) return fail(cancelled("bodies"));
+    for (int pass = 0;; ++pass) {
+      if (!build_junctions()) return fail(cancelled("junctions"));
+      number_junctions();
+      if (!build_bodies()) return fail(cancelled("bodies"));
+      if (pass == kMergePasses || !merge_folded()) break;
+    }
     progress_.at("assemble", 0.0);
     if (pieces_.empty() && junctions_.empty()) {
       return fail({ErrorKind::kFailed,
@@ -143,12 +148,14 @@ class Seeder {
 
   void number_junctions() {
     number_.assign(built_.size(), -1);
+    junctions_.clear();
+    failed_.clear();
     for (std::size_t n = 0; n < built_.size(); ++n) {
       const PlannedNode& node = plan_.nodes()[n];
       if (!node.is_junction()) continue;
       if (built_[n].junction) {
         number_[n] = static_cast<int>(junctions_.size());
-        junctions_.push_back(std::move(*built_[n].junction));
+        junctions_.push_back(*built_[n].junction);
       } else {
         failed_.push_back(
             {"junction_" + node.name, built_[n].error ? built_[n].error->message() : "not built"});
@@ -163,6 +170,7 @@ class Seeder {
     std::vector<ClosedOpening> closed;
     std::vector<std::string> warnings;
     std::optional<FailedPart> failed;
+    bool folded = false;
   };
 
   bool build_bodies() {
@@ -176,13 +184,27 @@ class Seeder {
       progress_.at("bodies", static_cast<double>(++done) / static_cast<double>(branches.size()));
     });
     if (progress_.should_stop()) return false;
-    for (Outcome& outcome : outcomes) {
+    pieces_.clear();
+    closed_.clear();
+    warnings_.clear();
+    folded_.clear();
+    for (std::size_t b = 0; b < outcomes.size(); ++b) {
+      Outcome& outcome = outcomes[b];
+      if (outcome.folded) folded_.push_back(static_cast<int>(b));
       for (BodyPiece& piece : outcome.pieces) pieces_.push_back(std::move(piece));
       for (ClosedOpening& closed : outcome.closed) closed_.push_back(std::move(closed));
       for (std::string& text : outcome.warnings) warnings_.push_back(std::move(text));
       if (outcome.failed) failed_.push_back(std::move(*outcome.failed));
     }
     return true;
+  }
+
+  // Junctions between which no body fits become one.
+  bool merge_folded() {
+    bool merged = false;
+    for (const int b : folded_) merged = plan_.merge_along(b) || merged;
+    if (merged) plan_.settle();
+    return merged;
   }
 
   bool is_ring(int b) const {
@@ -276,7 +298,8 @@ class Seeder {
       }
       return outcome;
     }
-    BodyPiece piece = sweep(followed(branch, start, end), start, end);
+    const Eigen::Matrix4Xd target = followed(branch, start, end);
+    BodyPiece piece = sweep(target, start, end);
     if (piece.body.jacobian_ratio < kFoldedBody && !capped) {
       // The ends are too near each other for a tube that bends: they are joined directly.
       Body loft = make_lofted_body(start.body, end.body);
@@ -295,12 +318,47 @@ class Seeder {
       }
     }
     if (piece.body.jacobian_ratio < kFoldedBody) {
+      outcome.folded = true;
       outcome.warnings.push_back(fmt::format("the wall of branch {} folds (Jacobian ratio {:.2g})",
                                              branch.name, piece.body.jacobian_ratio));
+    }
+    if (const Departure off = departure(branch, start, end, piece);
+        off.radii > kFarFromCenterline) {
+      outcome.warnings.push_back(fmt::format(
+          "the axis of branch {} leaves its centerline by up to {:.3g} mm ({:.2g} radii)",
+          branch.name, off.mm, off.radii));
     }
     piece.name = "wall_" + branch.name;
     outcome.pieces.push_back(std::move(piece));
     return outcome;
+  }
+
+  struct Departure {
+    double mm = 0;
+    double radii = 0;
+  };
+
+  // How far samples of the branch lie from the body's axis; along both the search only goes
+  // forward.
+  static Departure departure(const PlannedBranch& branch, const Stop& start, const Stop& end,
+                             const BodyPiece& piece) {
+    Departure worst;
+    if (!piece.path) return worst;
+    const int count = 8 * piece.path->knots().control_point_count();
+    Points3 axis(3, count + 1);
+    for (int i = 0; i <= count; ++i) {
+      axis.col(i) = piece.path->at(static_cast<double>(i) / count).head<3>();
+    }
+    Eigen::Index at = 0;
+    for (Eigen::Index i = 0; i < branch.samples.cols(); ++i) {
+      const double along = branch.along_mm[static_cast<std::size_t>(i)];
+      if (along < start.along || along > end.along) continue;
+      const Vec3 place = branch.samples.col(i).head<3>();
+      const auto away = [&](Eigen::Index k) { return (axis.col(k) - place).norm(); };
+      while (at < count && away(at + 1) <= away(at)) ++at;
+      if (away(at) > worst.mm) worst = {away(at), away(at) / branch.samples(3, i)};
+    }
+    return worst;
   }
 
   static bool close_at_opening(const BodyLink& opening, const BodyLink& rim, Outcome& outcome) {
@@ -344,6 +402,7 @@ class Seeder {
   BodyPiece sweep(const Eigen::Matrix4Xd& target, const Stop& start, const Stop& end) const {
     const BodyPath path = fit_body_path(target, start.path, end.path);
     BodyPiece piece;
+    piece.path = path.curve;
     piece.start = start.body.tangent.isZero() ? free_end(path.curve, 0.0) : start.body;
     piece.end = end.body.tangent.isZero() ? free_end(path.curve, 1.0) : end.body;
     piece.start_link = start.link;
@@ -428,6 +487,7 @@ class Seeder {
   std::vector<Junction> junctions_;
   std::vector<BodyPiece> pieces_;
   std::vector<ClosedOpening> closed_;
+  std::vector<int> folded_;  // branches whose body folds
   std::vector<std::string> warnings_;
   std::vector<FailedPart> failed_;
 };

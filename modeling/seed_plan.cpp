@@ -25,6 +25,7 @@ constexpr double kLeastStraight = 0.15;  // and of one that is straight
 constexpr double kRounding = 1e-9;
 constexpr double kWorthTightening = 0.05;  // radii by which an opening must come nearer
 constexpr double kStraightEnough = 0.7;    // chord over arc of a branch that may be taken straight
+constexpr double kDeepestSag = 0.75;       // radii between a branch and the chord it is taken for
 constexpr int kDirectionRounds = 8;
 constexpr int kPlanRounds = 64;
 
@@ -441,6 +442,12 @@ bool SeedPlan::straighten(int b, const Room& room, double bend) {
   const double chord = (to.center_mm - from.center_mm).norm();
   if (branch.tried_straight || chord < kStraightEnough * branch.length_mm()) return false;
   if (fits && bend <= kTightestBend) return false;
+  // The chord must stay well within the lumen of the branch it replaces.
+  const Vec3 along = (to.center_mm - from.center_mm) / chord;
+  for (const auto& sample : branch.samples.colwise()) {
+    const Vec3 arm = sample.head<3>() - from.center_mm;
+    if ((arm - arm.dot(along) * along).norm() > kDeepestSag * sample(3)) return false;
+  }
   branch.straight = true;
   return true;
 }
@@ -578,6 +585,16 @@ void SeedPlan::move_forward(int n, double radii) {
   node.caps_mm.clear();
   node.center_mm += radii * radius * mean / static_cast<double>(node.spec.branches.size());
   dirty_[index(n)] = 1;
+}
+
+bool SeedPlan::merge_along(int b) {
+  const PlannedBranch& branch = branches_[index(b)];
+  if (!branch.alive || branch.from == branch.to) return false;
+  if (!nodes_[index(branch.from)].is_junction() || !nodes_[index(branch.to)].is_junction()) {
+    return false;
+  }
+  merge(b, "has a wall that folds between them");
+  return true;
 }
 
 bool SeedPlan::merge_with_nearest(int n, double radii) {

@@ -73,6 +73,8 @@ class SeedPlan {
   void reach_farther(int node, double factor);
   void move_forward(int node, double radii);
   bool merge_with_nearest(int node, double radii);
+  // After a body folded: its two junctions become one. False if it has not two.
+  bool merge_along(int branch);
   void settle();
 
  private:

@@ -427,7 +427,7 @@ class Tessellator {
   std::vector<std::array<std::vector<EdgeUse>, 4>> uses_;
   std::vector<Vec3> points_;
   std::vector<Vec3> normals_;
-  std::vector<SurfacePoint> origins_;
+  std::vector<PatchPoint> origins_;
   std::vector<std::array<int, 3>> triangles_;
   std::vector<int> part_of_;
 };

@@ -20,14 +20,14 @@ struct TessellationOptions {
 };
 
 // Where on the network a point of the mesh lies; inside a cap the patch is -1.
-struct SurfacePoint {
+struct PatchPoint {
   int patch = -1;
   Vec2 uv = Vec2::Zero();
 };
 
 struct Tessellation {
-  TriangleMesh mesh;                  // parts: the regions, then the rims, in order
-  std::vector<SurfacePoint> origins;  // one for each point; one of several on a shared edge
+  TriangleMesh mesh;                // parts: the regions, then the rims, in order
+  std::vector<PatchPoint> origins;  // one for each point; one of several on a shared edge
 };
 
 // A mesh whose patches share the points of their joins and whose rims are closed by plane caps: it

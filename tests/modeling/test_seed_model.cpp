@@ -97,6 +97,45 @@ TEST(SeedModel, ASingleVesselIsOneBodyWithTwoRims) {
   }
 }
 
+// Straight, half a circle of the given bend radius, straight back: the course of a siphon.
+TreeMaker siphon(double radius, double bend, double leg) {
+  TreeMaker maker;
+  const int a = maker.node({0, 0, 0}, "a");
+  const int b = maker.node({2 * bend, 0, 0}, "b");
+  const double whole = 2 * leg + kPi * bend;
+  const auto shape = [=](double t) {
+    const double s = t * whole;
+    if (s < leg) return Vec3(0, 0, s);
+    if (s > leg + kPi * bend) return Vec3(2 * bend, 0, whole - s);
+    const double angle = (s - leg) / bend;
+    return Vec3(bend * (1 - std::cos(angle)), 0, leg + bend * std::sin(angle));
+  };
+  maker.branch(a, b, radius, shape, 80);
+  return maker;
+}
+
+TEST(SeedModel, ATightBendKeepsItsCourseAndItsVolume) {
+  for (const double bend : {1.5, 1.8, 3.0}) {  // in radii
+    const double radius = 2;
+    const TreeMaker maker = siphon(radius, bend * radius, 12);
+    const Result<Model> model = seed_model(maker.tree);
+    ASSERT_TRUE(model) << model.error().message();
+    for (const std::string& text : model->warnings) {
+      EXPECT_EQ(text.find("leaves its centerline"), std::string::npos) << text;
+    }
+    const double length = 24 + kPi * bend * radius;
+    EXPECT_NEAR(testing::enclosed_volume_mm3(model->network) / (kPi * radius * radius * length), 1,
+                0.05)
+        << "bend " << bend;
+  }
+}
+
+TEST(SeedModel, ABendTighterThanItsRadiusIsWarnedOf) {
+  const Result<Model> model = seed_model(siphon(2, 0.8, 12).tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_FALSE(model->warnings.empty());
+}
+
 TEST(SeedModel, ABifurcationHasItsNamesAndIsSmoothEverywhere) {
   const Result<Model> model = seed_model(bifurcation().tree);
   ASSERT_TRUE(model) << model.error().message();

@@ -95,9 +95,9 @@ TEST(Tessellate, KeepsTheChordTolerance) {
     int checked = 0;
     for (int k = 0; k < t->mesh.triangles.cols(); ++k) {
       const auto corner = t->mesh.triangles.col(k);
-      const SurfacePoint& a = t->origins[static_cast<std::size_t>(corner[0])];
-      const SurfacePoint& b = t->origins[static_cast<std::size_t>(corner[1])];
-      const SurfacePoint& d = t->origins[static_cast<std::size_t>(corner[2])];
+      const PatchPoint& a = t->origins[static_cast<std::size_t>(corner[0])];
+      const PatchPoint& b = t->origins[static_cast<std::size_t>(corner[1])];
+      const PatchPoint& d = t->origins[static_cast<std::size_t>(corner[2])];
       if (a.patch < 0 || a.patch != b.patch || a.patch != d.patch) continue;
       ++checked;
       const Vec2 uv = (a.uv + b.uv + d.uv) / 3;
@@ -120,7 +120,7 @@ TEST(Tessellate, PointsLieOnTheSurfaceWithItsNormals) {
   const auto t = tessellate(network);
   ASSERT_TRUE(t);
   for (std::size_t k = 0; k < t->origins.size(); ++k) {
-    const SurfacePoint& o = t->origins[k];
+    const PatchPoint& o = t->origins[k];
     if (o.patch < 0) continue;
     const BSplineSurface<3> surface = patch_surface(network, o.patch);
     const auto column = static_cast<Eigen::Index>(k);
