@@ -26,6 +26,7 @@ constexpr double kRounding = 1e-9;
 constexpr double kWorthTightening = 0.05;  // radii by which an opening must come nearer
 constexpr double kStraightEnough = 0.7;    // chord over arc of a branch that may be taken straight
 constexpr double kDeepestSag = 0.75;       // radii between a branch and the chord it is taken for
+constexpr double kLongestExtension = 4;    // of a free end that lies within its junction, in radii
 constexpr int kDirectionRounds = 8;
 constexpr int kPlanRounds = 64;
 
@@ -237,6 +238,33 @@ void SeedPlan::merge(int b, const std::string& why) {
   dirty_[index(kept)] = 1;
   for (const BranchEnd& end : a.ends) branches_[index(end.branch)].tried_straight = false;
   join_through(kept);
+}
+
+// Of two branches between the same two nodes, whose lumens are one along the way, the thinner goes:
+// it is a tunnel of a noisy mask, or a line that was drawn twice. True if one went.
+bool SeedPlan::drop_twins(int n) {
+  const std::vector<BranchEnd> ends = nodes_[index(n)].ends;
+  const auto far_node = [&](const PlannedBranch& b) { return b.from == n ? b.to : b.from; };
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    for (std::size_t j = i + 1; j < ends.size(); ++j) {
+      const PlannedBranch& a = branches_[index(ends[i].branch)];
+      const PlannedBranch& b = branches_[index(ends[j].branch)];
+      if (ends[i].branch == ends[j].branch || far_node(a) != far_node(b)) continue;
+      bool apart = false;  // a hole between the two needs room beyond both walls
+      for (const double f : {0.25, 0.5, 0.75}) {
+        const Vec4 p = a.at(f * a.length_mm());
+        const Vec4 q = b.at((a.from == b.from ? f : 1 - f) * b.length_mm());
+        apart = apart || (p - q).head<3>().norm() > p(3) + q(3);
+      }
+      if (apart && !(a.straight && b.straight)) continue;
+      const bool a_thinner = a.samples.row(3).mean() < b.samples.row(3).mean();
+      const BranchEnd gone = a_thinner ? ends[i] : ends[j];
+      const std::string& kept = a_thinner ? b.name : a.name;
+      drop(gone.branch, fmt::format("it runs inside branch {}", kept));
+      return true;
+    }
+  }
+  return false;
 }
 
 // A free end is moved outward along its last direction.
@@ -463,13 +491,22 @@ void SeedPlan::make_room(int b, const Room& room) {
     merge(b, fmt::format("is {:.3g} mm long and the two need {:.3g}", room.length, room.least));
   } else {
     const int node = from ? branch.from : branch.to;
-    extend(b, room.least - room.length + kLeastBody * room.radius);
+    const double missing = room.least - room.length + kLeastBody * room.radius;
+    if (missing > kLongestExtension * room.radius) {
+      drop(b, fmt::format("it ends {:.3g} mm before the opening of its junction", missing));
+      return;
+    }
+    extend(b, missing);
     dirty_[index(node)] = 1;
   }
 }
 
 void SeedPlan::settle() {
   for (int round = 0; round < kPlanRounds; ++round) {
+    for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
+      while (dirty_[index(n)] && nodes_[index(n)].is_junction() && drop_twins(n)) {
+      }
+    }
     std::vector<int> work;
     for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
       if (dirty_[index(n)] && nodes_[index(n)].is_junction()) work.push_back(n);

@@ -86,6 +86,7 @@ class SeedPlan {
   double bend_of(int branch) const;
   bool share_room(int branch);
   bool tighten();
+  bool drop_twins(int node);
   void extend(int branch, double missing_mm);
   void drop(int branch, const std::string& why);
   void merge(int branch, const std::string& why);
