@@ -105,8 +105,9 @@ void add_seed(CLI::App& app, CommandLine& line) {
   SeedArguments& a = line.seed;
   command->add_option("TREE", a.tree, "centerline file: .swc .csv ...")->required();
   command
-      ->add_option("-o,--output", a.outputs,
-                   "files to write, by suffix: .step .iges .brep .glb .stl .vtp .vtu .json .html")
+      ->add_option(
+          "-o,--output", a.outputs,
+          "files to write, by suffix: .step .iges .brep .glb .stl .vtp .vtu .json .html .geo")
       ->required();
   command->add_option("--unit", a.reading.unit, "unit of the file: mm, cm, m or um")
       ->check(CLI::IsMember({"mm", "cm", "m", "um"}));

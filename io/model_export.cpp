@@ -8,6 +8,7 @@
 
 #include "io/brep_file.h"
 #include "io/glb_file.h"
+#include "io/gmsh_script.h"
 #include "io/iges_file.h"
 #include "io/model_file.h"
 #include "io/report_html.h"
@@ -21,14 +22,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class Format { kNative, kStep, kIges, kBrep, kGlb, kStl, kVtk, kReport };
+enum class Format { kNative, kStep, kIges, kBrep, kGlb, kStl, kVtk, kReport, kGmsh };
 
 struct Suffix {
   const char* text;
   Format format;
 };
 
-constexpr std::array<Suffix, 11> kSuffixes{{{".json", Format::kNative},
+constexpr std::array<Suffix, 12> kSuffixes{{{".json", Format::kNative},
                                             {".step", Format::kStep},
                                             {".stp", Format::kStep},
                                             {".iges", Format::kIges},
@@ -38,7 +39,8 @@ constexpr std::array<Suffix, 11> kSuffixes{{{".json", Format::kNative},
                                             {".stl", Format::kStl},
                                             {".vtp", Format::kVtk},
                                             {".vtu", Format::kVtk},
-                                            {".html", Format::kReport}}};
+                                            {".html", Format::kReport},
+                                            {".geo", Format::kGmsh}}};
 
 std::string lower_suffix(const fs::path& path) {
   std::string suffix = path.extension().string();
@@ -56,7 +58,7 @@ std::optional<Format> format_of(const fs::path& path) {
 }
 
 bool needs_solid(Format f) {
-  return f == Format::kStep || f == Format::kIges || f == Format::kBrep;
+  return f == Format::kStep || f == Format::kIges || f == Format::kBrep || f == Format::kGmsh;
 }
 
 bool needs_triangles(Format f) {
@@ -89,6 +91,14 @@ Result<void> write_triangles(const TriangleMesh& mesh, const std::string& name,
     default:
       return write_vtk_mesh(path, mesh);
   }
+}
+
+// The STEP file that a script for Gmsh loads.
+std::optional<fs::path> step_among(const std::vector<fs::path>& paths) {
+  for (const fs::path& path : paths) {
+    if (format_of(path) == Format::kStep) return path;
+  }
+  return std::nullopt;
 }
 
 Result<void> write_measured_report(const fs::path& path, const Model& model,
@@ -131,6 +141,13 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
                           const ExportOptions& options, const Progress& progress) {
   for (const fs::path& path : paths) {
     if (auto target = check_export_target(path); !target) return target;
+    if (*format_of(path) == Format::kGmsh && !step_among(paths)) {
+      return fail({ErrorKind::kBadInput,
+                   "no STEP file for the script",
+                   path.string(),
+                   {},
+                   "a .geo script loads a .step that is written with it"});
+    }
   }
   std::optional<Solid> solid;
   std::optional<TriangleMesh> mesh;
@@ -146,7 +163,9 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
         if (!made) return fail(made.error());
         solid = std::move(*made);
       }
-      written = write_solid(*solid, model.name, paths[i], options, progress);
+      written = format == Format::kGmsh
+                    ? write_gmsh_script(*solid, *step_among(paths), paths[i])
+                    : write_solid(*solid, model.name, paths[i], options, progress);
     } else if (needs_triangles(format) || format == Format::kReport) {
       if (!mesh) {
         auto made = tessellate(model.network, options.tessellation, progress);
@@ -210,7 +229,8 @@ Result<AnyModel> read_any_model(const fs::path& path, const Progress& progress) 
     if (!result) return fail(result.error());
     return AnyModel(std::move(*result));
   };
-  if (!format || *format == Format::kGlb || *format == Format::kReport) {
+  if (!format || *format == Format::kGlb || *format == Format::kReport ||
+      *format == Format::kGmsh) {
     return fail(unknown_suffix(path, ErrorKind::kBadInput,
                                "one of .json .step .stp .iges .igs .brep .stl .vtp .vtu"));
   }

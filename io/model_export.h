@@ -27,7 +27,8 @@ std::string exported_suffixes();
 Result<void> check_export_target(const std::filesystem::path& path);
 
 // Writes the model to every path: .json (native), .step .stp, .iges .igs, .brep, .glb, .stl, .vtp,
-// .vtu, .html (the report, with its facts beside it). The solid and the triangles are made once,
+// .vtu, .html (the report, with its facts beside it), .geo (a Gmsh script that
+// loads the .step among the paths and names its faces). The solid and the triangles are made once,
 // and only if a path needs them. Each file appears whole or not at all; targets are checked before
 // the first is written. Errors: those of the writers.
 Result<void> export_model(const Model& model, const std::vector<std::filesystem::path>& paths,
