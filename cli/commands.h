@@ -14,7 +14,8 @@ namespace angiospline::cli {
 struct CenterlineArguments {
   std::string unit;  // mm, cm, m, um, or empty: as the format has it
   bool radius_is_diameter = false;
-  std::string frame;  // LPS, RAS, or empty: as the format has it
+  std::string frame;                  // LPS, RAS, or empty: as the format has it
+  std::optional<double> voxel_width;  // as CenterlineFileOptions has it
 };
 
 // How a vessel is told from its background.

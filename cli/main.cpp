@@ -113,6 +113,10 @@ void add_seed(CLI::App& app, CommandLine& line) {
       ->check(CLI::IsMember({"mm", "cm", "m", "um"}));
   command->add_flag("--radius-is-diameter", a.reading.radius_is_diameter,
                     "the radius column holds diameters");
+  command
+      ->add_option("--voxel-width", a.reading.voxel_width,
+                   "VascuSynth only: width of a voxel in the unit of the radii")
+      ->check(CLI::PositiveNumber);
   command->add_option("--frame", a.reading.frame, "coordinate frame of the file: LPS or RAS")
       ->check(CLI::IsMember({"LPS", "RAS"}));
   command->add_option("--name", a.name, "product name (default: the file's name)");

@@ -15,6 +15,7 @@ Result<CenterlineFileOptions> centerline_options(const CenterlineArguments& argu
     options.unit_mm = *unit;
   }
   options.radius_is_diameter = arguments.radius_is_diameter;
+  options.voxel_width = arguments.voxel_width;
   if (arguments.frame == "LPS") options.frame = CoordinateFrame::kLps;
   if (arguments.frame == "RAS") options.frame = CoordinateFrame::kRas;
   return options;
