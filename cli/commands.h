@@ -77,6 +77,15 @@ struct CompareArguments {
   bool json = false;
 };
 
+struct CompareMasksArguments {
+  std::string truth;
+  std::string result;
+  bool level_set = false;   // `truth` is a level set, negative inside
+  bool within_box = false;  // what lies beyond the bounding box of the truth does not count
+  bool no_centerlines = false;
+  bool json = false;
+};
+
 struct ConvertArguments {
   std::string input;
   std::vector<std::string> outputs;
@@ -99,6 +108,7 @@ int run_thin(const ThinArguments& arguments);
 int run_graph(const GraphArguments& arguments);
 int run_check(const CheckArguments& arguments);
 int run_compare(const CompareArguments& arguments);
+int run_compare_masks(const CompareMasksArguments& arguments);
 int run_convert(const ConvertArguments& arguments);
 int run_phantom(const PhantomArguments& arguments);
 

@@ -84,6 +84,7 @@ struct CommandLine {
   GraphArguments graph;
   CheckArguments check;
   CompareArguments compare;
+  CompareMasksArguments compare_masks;
   ConvertArguments convert;
   PhantomArguments phantom;
   std::function<int()> verb;
@@ -147,7 +148,8 @@ void add_graph(CLI::App& app, CommandLine& line) {
   GraphArguments& a = line.graph;
   command->add_option("SKELETON", a.skeleton, "skeleton image, or the mask itself")->required();
   command->add_option("--mask", a.mask, "mask the skeleton came from, for the radii");
-  command->add_option("-o,--output", a.outputs, "centerline files to write: .swc .csv .vtp");
+  command->add_option("-o,--output", a.outputs,
+                      "centerline files to write: .swc .csv .graphml .vtp");
   add_root_option(command, a.root_mm);
   command->add_flag("--keep-twigs", a.keep_twigs, "do not prune");
   command->add_flag("--table", a.table, "print the level-order table of nodes");
@@ -172,6 +174,21 @@ void add_compare(CLI::App& app, CommandLine& line) {
       ->check(CLI::NonNegativeNumber);
   add_json_flag(command, line.compare.json);
   command->callback([&line] { line.verb = [&line] { return run_compare(line.compare); }; });
+}
+
+void add_compare_masks(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "compare-masks", "how alike two masks are: voxels, surfaces, topology, centerlines");
+  CompareMasksArguments& a = line.compare_masks;
+  command->add_option("TRUTH", a.truth, "mask image, nonzero inside")->required();
+  command->add_option("RESULT", a.result, "mask image on the same grid")->required();
+  command->add_flag("--level-set", a.level_set, "TRUTH is a level set, negative inside");
+  command->add_flag("--within-box", a.within_box,
+                    "leave out what lies beyond the bounding box of TRUTH");
+  command->add_flag("--no-centerlines", a.no_centerlines, "do not thin the masks");
+  add_json_flag(command, a.json);
+  command->callback(
+      [&line] { line.verb = [&line] { return run_compare_masks(line.compare_masks); }; });
 }
 
 void add_convert(CLI::App& app, CommandLine& line) {
@@ -205,7 +222,7 @@ int run(int argc, char** argv) {
   app.option_defaults()->always_capture_default();
   CommandLine line;
   for (const auto add : {add_recover, add_seed, add_segment, add_thin, add_graph, add_check,
-                         add_compare, add_convert, add_phantom}) {
+                         add_compare, add_compare_masks, add_convert, add_phantom}) {
     add(app, line);
   }
   try {

@@ -33,4 +33,7 @@ Result<Segmented> segment_image(const SegmentArguments& arguments, const Progres
 // The image as a mask: nonzero voxels are inside. Errors: all voxels are zero (names `file`).
 Result<Mask> mask_from_image(const AnyImage& image, const std::string& file);
 
+// The inside of a level set: voxels below 0. Errors: there are none (names `file`).
+Result<Mask> mask_from_level_set(const AnyImage& image, const std::string& file);
+
 }  // namespace angiospline::cli

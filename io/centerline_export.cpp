@@ -2,6 +2,7 @@
 
 #include "base/atomic_file.h"
 #include "io/csv_centerline.h"
+#include "io/graphml_file.h"
 #include "io/swc_file.h"
 #include "io/vtk_file.h"
 
@@ -9,9 +10,9 @@ namespace angiospline {
 
 Result<void> check_centerline_target(const std::filesystem::path& path) {
   const std::string suffix = path.extension().string();
-  if (suffix == ".swc" || suffix == ".csv" || suffix == ".vtp") return {};
+  if (suffix == ".swc" || suffix == ".csv" || suffix == ".graphml" || suffix == ".vtp") return {};
   return fail({ErrorKind::kBadInput, "unknown centerline format", path.string(), suffix,
-               "one of .swc .csv .vtp"});
+               "one of .swc .csv .graphml .vtp"});
 }
 
 Result<void> write_centerline_file(const std::filesystem::path& path, const CenterlineTree& tree) {
@@ -19,6 +20,7 @@ Result<void> write_centerline_file(const std::filesystem::path& path, const Cent
   const std::string suffix = path.extension().string();
   if (suffix == ".swc") return write_file(path, swc_text(tree));
   if (suffix == ".csv") return write_file(path, csv_text(tree));
+  if (suffix == ".graphml") return write_file(path, graphml_text(tree));
   return write_vtk_centerlines(path, tree);
 }
 
