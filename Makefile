@@ -26,7 +26,8 @@ build: install
 test: build
 	@scripts/run_tests.sh release
 
-demo: build
+demo: install
+	@scripts/build.sh release angiospline
 	@scripts/demo.sh $(BUILD)/cli/angiospline out/demo
 
 sanitize: install
