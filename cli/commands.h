@@ -70,6 +70,15 @@ struct CheckArguments {
   bool json = false;
 };
 
+struct SmoothArguments {
+  std::string model;
+  std::vector<std::string> outputs;
+  double clean_deg = 1e-3;  // parts no rougher than this are left alone
+  bool everything = false;
+  std::string step_schema = "AP242";
+  bool json = false;
+};
+
 struct CompareArguments {
   std::string a;
   std::string b;
@@ -106,6 +115,7 @@ int run_seed(const SeedArguments& arguments);
 int run_segment(const SegmentArguments& arguments);
 int run_thin(const ThinArguments& arguments);
 int run_graph(const GraphArguments& arguments);
+int run_smooth(const SmoothArguments& arguments);
 int run_check(const CheckArguments& arguments);
 int run_compare(const CompareArguments& arguments);
 int run_compare_masks(const CompareMasksArguments& arguments);

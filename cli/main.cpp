@@ -82,6 +82,7 @@ struct CommandLine {
   SegmentArguments segment;
   ThinArguments thin;
   GraphArguments graph;
+  SmoothArguments smooth;
   CheckArguments check;
   CompareArguments compare;
   CompareMasksArguments compare_masks;
@@ -157,6 +158,22 @@ void add_graph(CLI::App& app, CommandLine& line) {
   command->callback([&line] { line.verb = [&line] { return run_graph(line.graph); }; });
 }
 
+void add_smooth(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("smooth", "make a native model tangent-plane continuous again");
+  SmoothArguments& a = line.smooth;
+  command->add_option("MODEL", a.model, "native model (.json)")->required();
+  command->add_option("-o,--output", a.outputs, "files to write, by suffix")->required();
+  command
+      ->add_option("--tolerance", a.clean_deg,
+                   "parts whose normals nowhere differ by more degrees are left as they are")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--all", a.everything, "smooth every part, clean or not");
+  add_schema_option(command, a.step_schema);
+  add_json_flag(command, a.json);
+  command->callback([&line] { line.verb = [&line] { return run_smooth(line.smooth); }; });
+}
+
 void add_check(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("check", "measure a model: native, STEP, IGES or BREP");
   command->add_option("MODEL", line.check.model, "model file")->required();
@@ -221,8 +238,8 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.option_defaults()->always_capture_default();
   CommandLine line;
-  for (const auto add : {add_recover, add_seed, add_segment, add_thin, add_graph, add_check,
-                         add_compare, add_compare_masks, add_convert, add_phantom}) {
+  for (const auto add : {add_recover, add_seed, add_segment, add_thin, add_graph, add_smooth,
+                         add_check, add_compare, add_compare_masks, add_convert, add_phantom}) {
     add(app, line);
   }
   try {

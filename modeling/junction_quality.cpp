@@ -72,21 +72,23 @@ double angle_deg(const Vec3& a, const Vec3& b) {
   return kDegrees * std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-}  // namespace
+PatchPoints patch_points(const JunctionNet& net, int patch) {
+  PatchPoints points;
+  for (int k = 0; k < kPoints; ++k) {
+    points.col(k) = net.points.col(net.grid.at(patch, k / kSize, k % kSize));
+  }
+  return points;
+}
 
-JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionTarget& target,
-                                 const JunctionNet& net) {
+// Without a target there is nothing to be off from, and lengths are in the net's unit.
+JunctionQuality measure(const JunctionTopology& topology, const JunctionTarget* target,
+                        const JunctionNet& net) {
   static const auto kGridBasis = basis_table(kGrid);
   static const auto kEdgeBasis = basis_table(kEdgeSamples);
   const int patches = static_cast<int>(topology.patches.size());
   std::vector<PatchPoints> P(at(patches));
-  for (int p = 0; p < patches; ++p) {
-    for (int k = 0; k < kPoints; ++k) {
-      P[at(p)].col(k) = net.points.col(net.grid.at(p, k / kSize, k % kSize));
-    }
-  }
-  double smallest = target.branches().front().radius;
-  for (const TargetBranch& branch : target.branches()) smallest = std::min(smallest, branch.radius);
+  for (int p = 0; p < patches; ++p) P[at(p)] = patch_points(net, p);
+  const double smallest = *std::min_element(net.scale.begin(), net.scale.end());
 
   JunctionQuality q;
   q.jacobian_ratio = 1;
@@ -102,15 +104,17 @@ JunctionQuality junction_quality(const JunctionTopology& topology, const Junctio
         const Vec3 cross = d.su.cross(d.sv);
         const double area = cross.norm();
         const Vec3 n = cross / area;
-        const JunctionTarget::Foot foot = target.foot(d.s);
         least = std::min(least, area);
         sum += area;
         grid.col(i * kGrid + j) = d.s;
-        q.normal_off_target_deg = std::max(q.normal_off_target_deg, angle_deg(n, foot.normal));
         q.curvature_times_radius =
             std::max(q.curvature_times_radius, smallest * largest_curvature(d, n));
-        q.distance_to_union =
-            std::max(q.distance_to_union, std::abs(target.union_distance(d.s)) / smallest);
+        if (target != nullptr) {
+          q.normal_off_target_deg =
+              std::max(q.normal_off_target_deg, angle_deg(n, target->foot(d.s).normal));
+          q.distance_to_union =
+              std::max(q.distance_to_union, std::abs(target->union_distance(d.s)) / smallest);
+        }
         star_shaped = star_shaped && d.s.dot(n) > 0;
       }
     }
@@ -143,6 +147,31 @@ JunctionQuality junction_quality(const JunctionTopology& topology, const Junctio
   }
   if (!net.points.allFinite()) q.worst_angle_deg = 180;
   return q;
+}
+
+}  // namespace
+
+JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionTarget& target,
+                                 const JunctionNet& net) {
+  return measure(topology, &target, net);
+}
+
+JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionNet& net) {
+  return measure(topology, nullptr, net);
+}
+
+Points3 junction_normals(const JunctionTopology& topology, const JunctionNet& net) {
+  static const auto kGridBasis = basis_table(kGrid);
+  const int patches = static_cast<int>(topology.patches.size());
+  Points3 normals(3, patches * kGrid * kGrid);
+  for (int p = 0; p < patches; ++p) {
+    const PatchPoints P = patch_points(net, p);
+    for (int k = 0; k < kGrid * kGrid; ++k) {
+      const Derivatives d = evaluate(P, kGridBasis[at(k / kGrid)], kGridBasis[at(k % kGrid)]);
+      normals.col(p * kGrid * kGrid + k) = d.su.cross(d.sv).normalized();
+    }
+  }
+  return normals;
 }
 
 bool is_sound(const JunctionQuality& q) { return failed_gate(q).empty(); }

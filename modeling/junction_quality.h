@@ -22,6 +22,13 @@ struct JunctionQuality {
 JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionTarget& target,
                                  const JunctionNet& net);
 
+// The same without a target: what concerns it stays zero. A surface that leaves the rays from the
+// origin is searched for self-intersections.
+JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionNet& net);
+
+// Unit normals on the same grids, patch by patch.
+Points3 junction_normals(const JunctionTopology& topology, const JunctionNet& net);
+
 // Limits of what is usable at all, and of what is also a fair surface.
 bool is_sound(const JunctionQuality& quality);
 bool is_fair(const JunctionQuality& quality);

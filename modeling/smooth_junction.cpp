@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "modeling/kkt_system.h"
 
@@ -10,12 +11,13 @@ namespace {
 
 constexpr double kEquationShift = 1e-12;     // -eps in the corner of the KKT matrix
 constexpr double kCoefficientWeight = 1e-3;  // keeps rho and nu determined
-constexpr double kSolved = 1e-13;            // largest residual that counts as zero, in radii
+constexpr EnergyWeights kInPlaceWeights{0.0, 0.0, 1.0, 1e-5};
+constexpr double kSolved = 1e-13;  // largest residual that counts as zero, in radii
 
 // One junction's sequence of steps on one sparse pattern.
 class StepSolver {
  public:
-  StepSolver(const JunctionTopology& topology, const JunctionTarget& target,
+  StepSolver(const JunctionTopology& topology, const JunctionTarget* target,
              const JunctionLayout& layout, const SmoothingWeights& weights, JunctionNet& net)
       : weights_(weights),
         net_(net),
@@ -127,11 +129,9 @@ class StepSolver {
   KktSystem system_;
 };
 
-}  // namespace
-
-SmoothedNet smooth_junction(const JunctionTopology& topology, const JunctionTarget& target,
-                            const JunctionLayout& layout, const SmoothingWeights& weights) {
-  SmoothedNet result{start_net(topology, layout), 0.0, 0, true};
+// From result.net.
+void smooth(const JunctionTopology& topology, const JunctionTarget* target,
+            const JunctionLayout& layout, const SmoothingWeights& weights, SmoothedNet& result) {
   StepSolver solver(topology, target, layout, weights, result.net);
   const auto took = [&](double move) {
     ++result.steps;
@@ -139,25 +139,43 @@ SmoothedNet smooth_junction(const JunctionTopology& topology, const JunctionTarg
     return result.solved;
   };
   for (int k = 0; k < weights.fit_steps; ++k) {
-    if (!took(solver.free_step(kFitWeights))) return result;
+    if (!took(solver.free_step(kFitWeights))) return;
   }
   for (int k = 0; k < weights.free_steps; ++k) {
-    if (!took(solver.free_step(weights.energy))) return result;
+    if (!took(solver.free_step(weights.energy))) return;
   }
   solver.restart_coefficients();
   for (int k = 0; k < weights.most_steps; ++k) {
     const double move = solver.constrained_step(weights.energy);
-    if (!took(move)) return result;
+    if (!took(move)) return;
     if (move < 1e-3) break;
   }
   result.residual = solver.residual();
   for (int k = 0; k < weights.most_polish_steps && result.residual > kSolved; ++k) {
-    if (!took(solver.polish_step())) return result;
+    if (!took(solver.polish_step())) return;
     const double now = solver.residual();
     const bool stalled = now > 0.5 * result.residual && now < 1e-10;
     result.residual = now;
     if (stalled) break;
   }
+}
+
+}  // namespace
+
+SmoothedNet smooth_junction(const JunctionTopology& topology, const JunctionTarget& target,
+                            const JunctionLayout& layout, const SmoothingWeights& weights) {
+  SmoothedNet result{start_net(topology, layout), 0.0, 0, true};
+  smooth(topology, &target, layout, weights, result);
+  return result;
+}
+
+SmoothedNet smooth_in_place(const JunctionTopology& topology, const JunctionLayout& layout,
+                            JunctionNet start) {
+  SmoothingWeights weights;
+  weights.energy = kInPlaceWeights;
+  weights.fit_steps = weights.free_steps = 0;
+  SmoothedNet result{std::move(start), 0.0, 0, true};
+  smooth(topology, nullptr, layout, weights, result);
   return result;
 }
 

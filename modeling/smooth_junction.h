@@ -36,4 +36,9 @@ struct SmoothedNet {
 SmoothedNet smooth_junction(const JunctionTopology& topology, const JunctionTarget& target,
                             const JunctionLayout& layout, const SmoothingWeights& weights = {});
 
+// The same without a target: from `start`, moving as little as possible away from the surface that
+// the layout was taken from.
+SmoothedNet smooth_in_place(const JunctionTopology& topology, const JunctionLayout& layout,
+                            JunctionNet start);
+
 }  // namespace angiospline

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/contract.h"
 #include "kernel/basis.h"
 
 namespace angiospline {
@@ -33,7 +34,7 @@ Eigen::MatrixXd second_difference_matrix() {
 
 }  // namespace
 
-TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarget& target,
+TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarget* target,
                            const JunctionLayout& layout, const JunctionNet& net)
     : target_(target),
       layout_(layout),
@@ -84,6 +85,7 @@ TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarge
 }
 
 void TargetEnergy::update(const JunctionNet& net, const EnergyWeights& weights) {
+  EXPECTS(weights.distance == 0 || target_ != nullptr);
   for (int p = 0; p < patches(); ++p) update_patch(p, net, weights);
 }
 
@@ -110,7 +112,7 @@ void TargetEnergy::update_patch(int p, const JunctionNet& net, const EnergyWeigh
     anchors.col(s) = layout_.nodes.col(node);
     const double w = std::sqrt(sample_weights_(s));
     JunctionTarget::Foot foot{0, layout_.normals.col(node)};
-    if (weights.distance > 0) foot = target_.foot(S.col(s));
+    if (weights.distance > 0) foot = target_->foot(S.col(s));
     normals.col(s) = foot.normal;
     const double on_distance = w * std::sqrt(weights.distance) / scale(s);
     const double shortest = 0.05 * scale(s);

@@ -33,10 +33,10 @@ struct PatchModel {
 
 // The Gauss-Newton models of all patches: normals and tangent lengths are held at their current
 // values. Where the weight of the distance is zero the normals are the layout's and the target is
-// not evaluated.
+// not evaluated; it may be null then.
 class TargetEnergy {
  public:
-  TargetEnergy(const JunctionTopology& topology, const JunctionTarget& target,
+  TargetEnergy(const JunctionTopology& topology, const JunctionTarget* target,
                const JunctionLayout& layout, const JunctionNet& net);
 
   int patches() const { return static_cast<int>(models_.size()); }
@@ -48,7 +48,7 @@ class TargetEnergy {
  private:
   void update_patch(int patch, const JunctionNet& net, const EnergyWeights& weights);
 
-  const JunctionTarget& target_;
+  const JunctionTarget* target_;
   const JunctionLayout& layout_;
   std::vector<PatchModel> models_;
   std::vector<Eigen::VectorXd> scales_;  // local radius at each sample of a patch

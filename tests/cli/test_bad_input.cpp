@@ -134,8 +134,8 @@ TEST(Command, RefusesUnknownWordsWithOneLine) {
 }
 
 TEST(Command, HelpOfEverySubcommandGoesToStandardOutput) {
-  for (const char* verb : {"recover", "seed", "segment", "thin", "graph", "check", "compare",
-                           "compare-masks", "convert", "phantom"}) {
+  for (const char* verb : {"recover", "seed", "segment", "thin", "graph", "smooth", "check",
+                           "compare", "compare-masks", "convert", "phantom"}) {
     const ProgramRun run = run_angiospline({verb, "--help"});
     EXPECT_EQ(run.exit_code, 0);
     EXPECT_NE(run.out.find("-h,--help"), std::string::npos);
