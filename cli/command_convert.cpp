@@ -18,7 +18,8 @@ int run_convert(const ConvertArguments& arguments) {
   }
   const auto any = read_any_model(input, console.progress());
   if (!any) return report_error(any.error());
-  const ExportOptions options{step_schema(arguments.step_schema), {}};
+  ExportOptions options;
+  options.step_schema = step_schema(arguments.step_schema);
   Result<void> written;
   if (const auto* model = std::get_if<Model>(&*any)) {
     written = export_model(*model, paths, options, console.progress());

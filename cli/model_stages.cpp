@@ -29,7 +29,8 @@ Result<Certificate> finish_model(const Model& model,
                                  const std::vector<std::filesystem::path>& paths,
                                  const std::string& schema, const Console& console,
                                  Stopwatch& watch) {
-  const ExportOptions options{step_schema(schema), {}};
+  ExportOptions options;
+  options.step_schema = step_schema(schema);
   if (const auto written = export_model(model, paths, options, console.progress()); !written) {
     return fail(written.error());
   }

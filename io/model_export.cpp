@@ -15,6 +15,7 @@
 #include "io/stl_file.h"
 #include "io/vtk_file.h"
 #include "modeling/certificate.h"
+#include "modeling/split_joins.h"
 #include "modeling/tessellate_solid.h"
 
 namespace angiospline {
@@ -60,6 +61,9 @@ std::optional<Format> format_of(const fs::path& path) {
 bool needs_solid(Format f) {
   return f == Format::kStep || f == Format::kIges || f == Format::kBrep || f == Format::kGmsh;
 }
+
+// Gmsh reads these, and puts a fixed least number of elements on every edge.
+bool wants_short_edges(Format f) { return f == Format::kStep || f == Format::kBrep; }
 
 bool needs_triangles(Format f) {
   return f == Format::kGlb || f == Format::kStl || f == Format::kVtk;
@@ -149,7 +153,7 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
                    "a .geo script loads a .step that is written with it"});
     }
   }
-  std::optional<Solid> solid;
+  std::array<std::optional<Solid>, 2> solids;  // with the network's own edges; with short ones
   std::optional<TriangleMesh> mesh;
   for (std::size_t i = 0; i < paths.size(); ++i) {
     progress.at("writing " + paths[i].filename().string(),
@@ -158,8 +162,10 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
     const Format format = *format_of(paths[i]);
     Result<void> written;
     if (needs_solid(format)) {
+      std::optional<Solid>& solid = solids[wants_short_edges(format) ? 1 : 0];
       if (!solid) {
-        auto made = make_solid(model.network);
+        auto made = make_solid(wants_short_edges(format) ? split_joins(model.network, options.edges)
+                                                         : model.network);
         if (!made) return fail(made.error());
         solid = std::move(*made);
       }

@@ -11,6 +11,7 @@
 #include "io/step_file.h"
 #include "modeling/model.h"
 #include "modeling/solid.h"
+#include "modeling/split_joins.h"
 #include "modeling/tessellation.h"
 
 namespace angiospline {
@@ -18,6 +19,7 @@ namespace angiospline {
 struct ExportOptions {
   StepSchema step_schema = StepSchema::kAp242;
   TessellationOptions tessellation;  // of GLB, STL, VTP and VTU
+  SplitOptions edges;                // of STEP and BREP, so that Gmsh meshes them as they are
 };
 
 // The suffixes that export_model writes, for messages: ".json .step ...".
@@ -28,8 +30,8 @@ Result<void> check_export_target(const std::filesystem::path& path);
 
 // Writes the model to every path: .json (native), .step .stp, .iges .igs, .brep, .glb, .stl, .vtp,
 // .vtu, .html (the report, with its facts beside it), .geo (a Gmsh script that
-// loads the .step among the paths and names its faces). The solid and the triangles are made once,
-// and only if a path needs them. Each file appears whole or not at all; targets are checked before
+// loads the .step among the paths and names its faces). Solids and triangles are made once, and
+// only if a path needs them. Each file appears whole or not at all; targets are checked before
 // the first is written. Errors: those of the writers.
 Result<void> export_model(const Model& model, const std::vector<std::filesystem::path>& paths,
                           const ExportOptions& options = {}, const Progress& progress = {});

@@ -57,9 +57,12 @@ FaceKind kind_of(RimKind kind) {
 
 // The straight curve in the (u, v) plane that runs from `a` at parameter `from` to `b` at `to`, on
 // a parameter line. A line has unit speed; where the intervals differ in length it takes a spline.
-Handle(Geom2d_Curve) straight(const Vec2& a, const Vec2& b, double from, double to) {
+// So does a part of a side: a line has no ends, and readers of STEP that do not find the edge's at
+// the border of the surface search for them, point by point.
+Handle(Geom2d_Curve) straight(const Vec2& a, const Vec2& b, double from, double to, bool whole) {
   const Vec2 step = b - a;
-  if (std::abs(step.norm() - (to - from)) <= 4e-16 * std::max(std::abs(from), std::abs(to))) {
+  if (whole &&
+      std::abs(step.norm() - (to - from)) <= 4e-16 * std::max(std::abs(from), std::abs(to))) {
     const Vec2 unit = step.normalized();
     const Vec2 origin = a - from * unit;
     return new Geom2d_Line(gp_Pnt2d(origin.x(), origin.y()), gp_Dir2d(unit.x(), unit.y()));
@@ -73,6 +76,13 @@ Handle(Geom2d_Curve) straight(const Vec2& a, const Vec2& b, double from, double 
   TColStd_Array1OfInteger multiplicities(1, 2);
   multiplicities.Init(2);
   return new Geom2d_BSplineCurve(poles, knots, multiplicities, 1);
+}
+
+// Whether the side is all of its patch's side.
+bool is_whole(const Patch& patch, const Side& side) {
+  const KnotVector& knots =
+      side.side == PatchSide::kU0 || side.side == PatchSide::kU1 ? patch.v : patch.u;
+  return side.from == knots.first() && side.to == knots.last();
 }
 
 // One network on its way to a shape.
@@ -260,7 +270,7 @@ class SolidBuilder {
     const auto at = [&](double t) {
       return side_parameters(patch, side.side, use == 0 ? t : second_parameter(edge, t));
     };
-    return straight(at(from), at(to), from, to);
+    return straight(at(from), at(to), from, to, is_whole(patch, side));
   }
 
   void add_parameter_curves(const TopoDS_Edge& shape, const NetworkEdge& edge, double tolerance) {

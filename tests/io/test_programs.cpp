@@ -11,6 +11,7 @@
 #include "io/certificate_json.h"
 #include "io/gmsh_script.h"
 #include "io/iges_file.h"
+#include "io/model_export.h"
 #include "io/step_file.h"
 #include "tests/modeling/crafted_networks.h"
 #include "tests/modeling/sample_networks.h"
@@ -81,6 +82,18 @@ TEST_F(ExternalPrograms, GmshMeshesTheStepAndKeepsOurNamesThroughTheScript) {
   EXPECT_EQ(groups.code, 0) << groups.output;
 }
 
+// Gmsh's own element size is a tenth of the model's diagonal, wider than this vessel: it is the
+// edges, cut into short pieces, that make it mesh finely enough.
+TEST_F(ExternalPrograms, GmshMeshesTheStepOfALongThinVesselWithoutAnyOption) {
+  if (!is_installed("gmsh")) GTEST_SKIP() << "gmsh is not installed";
+  const Model model = samples::model_of(samples::tube(1.0, 60.0));
+  ASSERT_TRUE(export_model(model, {at("long.step")}));
+  const Outcome mesh = run("gmsh -3 -o " + at("long.msh") + " " + at("long.step"));
+  EXPECT_EQ(mesh.code, 0);
+  EXPECT_EQ(mesh.output.find("Error"), std::string::npos) << mesh.output;
+  EXPECT_EQ(mesh.output.find("Warning"), std::string::npos) << mesh.output;
+}
+
 TEST_F(ExternalPrograms, FreeCadOpensTheIgesAsValidClosedSolids) {
   if (!is_installed("freecadcmd")) GTEST_SKIP() << "freecadcmd is not installed";
   ASSERT_TRUE(write_iges(solid_, at("model.igs")));
@@ -105,8 +118,8 @@ TEST_F(ExternalPrograms, NetgenMeshesTheStepAndShowsOurNames) {
   const Solid one = make_solid(crafted::tube_of_quarters(1, 6)).value();
   ASSERT_TRUE(write_step(one, at("model.step")));
   const Outcome mesh = run("LD_LIBRARY_PATH=" + folder_.string() + ":" + libraries +
-                       " netgen -batchmode -coarse -geofile=" + at("model.step") +
-                       " -meshfile=" + at("model.vol"));
+                           " netgen -batchmode -coarse -geofile=" + at("model.step") +
+                           " -meshfile=" + at("model.vol"));
   if (mesh.output.find("couldn't load file") != std::string::npos) {
     GTEST_SKIP() << "netgen does not start here: " << mesh.output;
   }

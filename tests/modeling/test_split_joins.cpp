@@ -1,0 +1,70 @@
+#include <gtest/gtest.h>
+
+#include "modeling/certificate.h"
+#include "modeling/solid.h"
+#include "modeling/split_joins.h"
+#include "tests/modeling/crafted_networks.h"
+#include "tests/modeling/sample_networks.h"
+
+namespace angiospline {
+namespace {
+
+std::vector<SurfaceNetwork> networks() {
+  return {samples::tube(), samples::tube_with_t_vertex(), samples::torus(), samples::bent_tube(),
+          crafted::tube_of_quarters(1, 6)};
+}
+
+TEST(SplitJoins, KeepsTheLawsOfANetworkAndTouchesNoPatch) {
+  for (const SurfaceNetwork& whole : networks()) {
+    const SurfaceNetwork split = split_joins(whole);
+    const auto defect = find_defect(split);
+    EXPECT_FALSE(defect) << defect->message();
+    EXPECT_GT(split.joins.size(), whole.joins.size());
+    EXPECT_EQ(split.patches.size(), whole.patches.size());
+    EXPECT_EQ(split.control_points_mm, whole.control_points_mm);
+    EXPECT_EQ(split.rims.size(), whole.rims.size());
+  }
+}
+
+TEST(SplitJoins, GivesTheSameClosedSolidWithTheSameFaces) {
+  for (const SurfaceNetwork& whole : networks()) {
+    const auto one = make_solid(whole);
+    const auto other = make_solid(split_joins(whole));
+    ASSERT_TRUE(one);
+    ASSERT_TRUE(other) << other.error().message();
+    const auto a = certify(*one);
+    const auto b = certify(*other);
+    ASSERT_TRUE(a && b);
+    EXPECT_TRUE(b->closed && b->valid);
+    EXPECT_EQ(a->genus, b->genus);
+    EXPECT_NEAR(a->volume_mm3, b->volume_mm3, 1e-9 * a->volume_mm3);
+    EXPECT_LT(b->max_gap_mm, 1e-12);
+    EXPECT_NEAR(a->max_normal_angle_deg, b->max_normal_angle_deg, 1e-6);
+    ASSERT_EQ(one->faces.size(), other->faces.size());
+    for (std::size_t k = 0; k < one->faces.size(); ++k) {
+      EXPECT_EQ(one->faces[k].name, other->faces[k].name);
+    }
+  }
+}
+
+// Half a circle of radius 1 turns by 180 degrees and is 2 wide; the tube is 10 long.
+TEST(SplitJoins, CutsATubesSeamsByItsWidthAndItsCirclesByTheirTurn) {
+  const SurfaceNetwork split = split_joins(samples::tube(1.0, 10.0), {1.0, 95.0});
+  for (const Rim& rim : split.rims) EXPECT_EQ(rim.sides.size(), 4U);
+  EXPECT_EQ(split.joins.size(), 10U);  // two seams of five pieces
+  const SurfaceNetwork coarse = split_joins(samples::tube(1.0, 10.0), {6.0, 200.0});
+  EXPECT_EQ(coarse.joins.size(), 2U);
+  for (const Rim& rim : coarse.rims) EXPECT_EQ(rim.sides.size(), 2U);
+}
+
+TEST(SplitJoins, DoesNotDependOnScale) {
+  const SurfaceNetwork small = split_joins(samples::tube(1e-3, 5e-3));
+  const SurfaceNetwork large = split_joins(samples::tube(1e3, 5e3));
+  ASSERT_EQ(small.joins.size(), large.joins.size());
+  for (std::size_t k = 0; k < small.joins.size(); ++k) {
+    EXPECT_NEAR(small.joins[k].a.to, large.joins[k].a.to, 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace angiospline
