@@ -110,7 +110,8 @@ struct Moments {
 
 struct Decision {
   bool vessel;
-  double threshold;  // grey value with vessels bright
+  double threshold;   // grey value with vessels bright
+  double fading = 1;  // of the signal here against that of the options' levels
 };
 
 // Error for options that no growing can use.
@@ -141,7 +142,9 @@ class AdaptiveThreshold {
       if (!std::isfinite(value)) return -std::numeric_limits<double>::infinity();
     return sign_ * value;
   }
-  bool admissible(double g) const { return g >= floor_ && std::isfinite(g); }
+  bool admissible(double g, double fading = 1) const {
+    return g >= fading * floor_ && std::isfinite(g);
+  }
 
   bool is_vessel(const Voxel& v) const { return vessel_.test(v[0], v[1], v[2]); }
   template <typename F>
@@ -164,6 +167,7 @@ class AdaptiveThreshold {
  private:
   Voxel brightest_near(const Voxel& v) const;
   Moments labelled_around(const Box& box, double reference) const;
+  double fading(double s1_mean, std::size_t s1_count, const Box& box) const;
   double mean_of_brightest_connected(const Voxel& c, const Box& box) const;
 
   const Image<T>& image_;
@@ -247,6 +251,22 @@ double AdaptiveThreshold<T>::mean_of_brightest_connected(const Voxel& c, const B
   return reference + sum / count;
 }
 
+// How much darker the vessel is here than at the seeds: 1 where it is thinner than the
+// neighbourhood, since there the edges' partial volume would be taken for a fading signal.
+template <typename T>
+double AdaptiveThreshold<T>::fading(double s1_mean, std::size_t s1_count, const Box& box) const {
+  constexpr double kThick = 0.3;   // share of the neighbourhood that is vessel
+  constexpr double kEdges = 0.85;  // what the edges leave of the mean at the wall of such a vessel
+  constexpr double kMost = 0.25;
+  if (!options_.vessel_level || !options_.background_level) return 1;
+  if (sign_ < 0 || *options_.background_level < 0 || !(*options_.vessel_level > 0)) return 1;
+  std::size_t volume = 1;
+  for (std::size_t k = 0; k < 3; ++k)
+    volume *= static_cast<std::size_t>(box.high[k] - box.low[k] + 1);
+  if (static_cast<double>(s1_count) < kThick * static_cast<double>(volume)) return 1;
+  return std::clamp(s1_mean / (kEdges * *options_.vessel_level), kMost, 1.0);
+}
+
 template <typename T>
 Decision AdaptiveThreshold<T>::decide(const Voxel& v) const {
   const Box box = box_around(v, half_, size_);
@@ -255,14 +275,15 @@ Decision AdaptiveThreshold<T>::decide(const Voxel& v) const {
   if (s1.count == 0) return {false, std::numeric_limits<double>::infinity()};
   const double mean = here + s1.mean();
   const double threshold = mean - options_.deviations * s1.deviation();
+  const double faded = fading(mean, s1.count, box);
   if (options_.background_level) {
     // Where the edge of a vessel lies: half way, less where M is generous.
     constexpr double kSurely = 0.5, kHardly = 0.45;
-    const double level = sign_ * *options_.background_level;
-    if (here >= level + kSurely * (mean - level)) return {true, threshold};
-    if (here < level + kHardly * (mean - level)) return {false, threshold};
+    const double level = faded * sign_ * *options_.background_level;
+    if (here >= level + kSurely * (mean - level)) return {true, threshold, faded};
+    if (here < level + kHardly * (mean - level)) return {false, threshold, faded};
   }
-  return {mean_of_brightest_connected(v, box) >= threshold, threshold};
+  return {mean_of_brightest_connected(v, box) >= threshold, threshold, faded};
 }
 
 template <typename T>

@@ -65,8 +65,8 @@ class Grower {
     rule_.label_vessel(v);
     seen_.set(v[0], v[1], v[2]);
   }
-  void queue_neighbours(const Voxel& v);
-  bool is_vessel(const Candidate& c);
+  void queue_neighbours(const Voxel& v, double fading = 1);
+  Decision decide(const Candidate& c);
   Segmentation finished();
 
   const Image<T>& image_;
@@ -80,18 +80,18 @@ class Grower {
 };
 
 template <typename T>
-void Grower<T>::queue_neighbours(const Voxel& v) {
+void Grower<T>::queue_neighbours(const Voxel& v, double fading) {
   for_each(box_around(v, 1, image_.grid.size), [&](const Voxel& n) {
     if (seen_.test(n[0], n[1], n[2])) return;
     const double g = rule_.grey(n);
-    if (!rule_.admissible(g)) return;
+    if (!rule_.admissible(g, fading)) return;
     seen_.set(n[0], n[1], n[2]);
     queue_.push({g, order_++, n});
   });
 }
 
 template <typename T>
-bool Grower<T>::is_vessel(const Candidate& c) {
+Decision Grower<T>::decide(const Candidate& c) {
   const Decision decision = rule_.decide(c.at);
   const double threshold = rule_.sign() * decision.threshold;
   if (report_.examined == 0) report_.threshold_min = report_.threshold_max = threshold;
@@ -99,7 +99,7 @@ bool Grower<T>::is_vessel(const Candidate& c) {
   report_.threshold_max = std::max(report_.threshold_max, threshold);
   threshold_sum_ += threshold;
   ++report_.examined;
-  return decision.vessel;
+  return decision;
 }
 
 template <typename T>
@@ -136,9 +136,10 @@ Result<Segmentation> Grower<T>::grow(const Progress& progress) {
     const Candidate c = queue_.top();
     queue_.pop();
     if (rule_.is_vessel(c.at)) continue;  // a later seed's start took it
-    if (is_vessel(c)) {
+    const Decision decision = decide(c);
+    if (decision.vessel) {
       label(c.at);
-      queue_neighbours(c.at);
+      queue_neighbours(c.at, decision.fading);
     } else {
       rule_.label_background(c.at);
     }

@@ -30,6 +30,10 @@ struct GrowOptions {
   // leak. Both bounds follow the brightness of the vessel nearby. Not in the thesis; without it the
   // rule is the thesis's alone.
   std::optional<double> background_level;
+  // Typical grey value of the vessels. With it and `background_level`, both not negative, a signal
+  // that fades along a thick vessel is followed: where vessel fills much of the neighbourhood and
+  // is darker than this, `background` and `background_level` go down with it, to a quarter.
+  std::optional<double> vessel_level;
   // Stops after looking at this many voxels.
   std::optional<std::size_t> max_examined;
   // A seed may lie this many voxels beside the vessel: it moves to the brightest voxel that near.

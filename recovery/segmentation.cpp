@@ -10,6 +10,7 @@
 #include "recovery/gaussian.h"
 #include "recovery/morphology.h"
 #include "recovery/topology_numbers.h"
+#include "recovery/tunnels.h"
 #include "recovery/vesselness.h"
 
 namespace angiospline {
@@ -192,6 +193,7 @@ Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
     const double floor = std::clamp(2 * l.background_deviation, 0.2 * contrast, 0.4 * contrast);
     if (!options.background) grow.background = sign * (l.background + floor);
     grow.background_level = sign * l.background;
+    grow.vessel_level = sign * l.vessel;
     l.vessel *= sign;
     l.background *= sign;
     report.levels = l;
@@ -264,11 +266,16 @@ Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const P
         fmt::format("growing stopped after {} voxels examined", report.grown.examined));
   Filled holes = fill_holes(std::move(grown->mask), options.largest_hole_vox);
   Filled cavities = fill_cavities(std::move(holes.mask));
-  report.filled_voxels = holes.voxels + cavities.voxels;
-  report.components = component_count(cavities.mask, Neighbours::kCorners26);
-  if (std::optional<std::string> leak = leak_sign(cavities.mask))
+  Result<ClosedTunnels> closed = close_tunnels(std::move(cavities.mask), {}, progress);
+  if (!closed) return fail(closed.error());
+  report.filled_voxels = holes.voxels + cavities.voxels + closed->voxels;
+  if (closed->tunnels > 0)
+    report.choices.push_back(
+        fmt::format("{} tunnels too narrow to be loops of vessels are filled", closed->tunnels));
+  report.components = component_count(closed->mask, Neighbours::kCorners26);
+  if (std::optional<std::string> leak = leak_sign(closed->mask))
     report.warnings.push_back(std::move(*leak));
-  return Segmented{std::move(cavities.mask), std::move(report)};
+  return Segmented{std::move(closed->mask), std::move(report)};
 }
 
 }  // namespace angiospline

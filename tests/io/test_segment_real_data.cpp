@@ -47,6 +47,12 @@ TEST(SegmentRealData, FindsTheAortaWithoutAnyParameter_real_data) {
   ASSERT_TRUE(s.has_value()) << s.error().message();
   EXPECT_TRUE(s->report.seeds_found);
   EXPECT_TRUE(s->report.warnings.empty());
+  EXPECT_EQ(topology_numbers(s->mask), (TopologyNumbers{1, 0, 0, 1}));
+  const Voxel size = s->mask.grid.size;  // the aorta fades towards the border and goes on to it
+  bool reaches_border = false;
+  for (int x = 0; x < size[0]; ++x)
+    for (int z = 0; z < size[2]; ++z) reaches_border |= s->mask[{x, size[1] - 1, z}] != 0;
+  EXPECT_TRUE(reaches_border);
   s->mask.grid = grid_of(level_set->image);  // the same voxels; the files differ in orientation
   const Mask truth = reference_of(std::get<Image<float>>(level_set->image), s->mask);
   const auto c = compare_masks(truth, s->mask);

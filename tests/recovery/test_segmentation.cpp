@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/random.h"
 #include "recovery/gaussian.h"
 #include "recovery/metrics.h"
 #include "recovery/morphology.h"
@@ -203,6 +204,31 @@ TEST(Segment, DarkVesselsAreFoundToo) {
   const auto found = segment(p->image, s);
   ASSERT_TRUE(found.has_value()) << found.error().message();
   EXPECT_GT(compare_masks(p->truth, found->mask)->dice, 0.96);
+}
+
+// As a coil leaves it: vessel and background lose four fifths of their signal along the vessel.
+TEST(Segment, FollowsAVesselWhoseSignalFades) {
+  Image<float> image;
+  image.grid.size = {48, 48, 160};
+  image.voxels.resize(image.grid.voxel_count());
+  Mask truth(image.grid);
+  Random random(3);
+  for (std::size_t i = 0; i < image.voxels.size(); ++i) {
+    const Voxel v = image.grid.voxel(i);
+    const double gain = std::exp(-1.6 * v[2] / 160.0);
+    const bool inside = std::hypot(v[0] - 24.0, v[1] - 24.0) <= 8;
+    truth.voxels[i] = inside;
+    image.voxels[i] = static_cast<float>(gain * (inside ? 2000 : 350) + 60 * random.gaussian());
+  }
+  SegmentOptions o;
+  o.seeds_mm = {Vec3(24, 24, 20)};
+  const auto s = segment(image, o);
+  ASSERT_TRUE(s.has_value()) << s.error().message();
+  const auto c = compare_masks(truth, s->mask);
+  ASSERT_TRUE(c.has_value());
+  EXPECT_GT(c->dice, 0.97);
+  EXPECT_EQ(c->result_topology, c->truth_topology);
+  EXPECT_TRUE(s->report.warnings.empty());
 }
 
 // ---- metrics ----------------------------------------------------------------------------------
