@@ -241,7 +241,7 @@ TEST(Divisions, OnlyPhantomNodesLetATubeMoveAsAWhole) {
   EXPECT_LT((*divide_by_svd(system.laplacian()))(push).norm(), 1e-8);
   EXPECT_LT((*divide_by_circulant(grid, 4, -1, CirculantNodes::kPlain))(push).norm(), 1e-8);
   // The rows of zeros at both ends take the mean out of the transform's null space.
-  EXPECT_GT((*divide_by_circulant(grid, 4, -1, CirculantNodes::kPhantom))(push).row(0).mean(), 1);
+  EXPECT_GT((*divide_by_circulant(grid, 4, -1, CirculantNodes::kPhantom))(push).row(0).mean(), 0.2);
   // Away from the ends of rows a plain circulant matrix is the true one.
   Points3 wave = Points3::Zero(3, mesh.node_count());
   for (int c = 0; c < 12; ++c) wave(1, 7 * 12 + c) = std::cos(2 * kPi * 3 * c / 12.0);
