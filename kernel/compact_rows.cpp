@@ -32,11 +32,11 @@ void CompactRows::set_row(int row, int column, const double* entries, int count)
 
 namespace {
 
-// kStride > 0 is a block size known at compile time.
-template <int kStride>
+// kStride > 0 is a block size known at compile time, and so is kWidth > 0, the length of the runs.
+template <int kStride, int kWidth = 0>
 void apply_rows(const CompactRows& A, const double* blocks, std::ptrdiff_t runtime, double* out) {
   const std::ptrdiff_t stride = kStride > 0 ? kStride : runtime;
-  const int width = A.width();
+  const int width = kWidth > 0 ? kWidth : A.width();
   for (int r = 0; r < A.rows(); ++r) {
     const double* a = A.row(r);
     const double* in = blocks + A.first(r) * stride;
@@ -66,7 +66,9 @@ void CompactRows::apply_blocks(const double* blocks, std::ptrdiff_t stride, doub
       return apply_rows<1>(*this, blocks, stride, out);
     case 2:
       return apply_rows<2>(*this, blocks, stride, out);
-    case 3:
+    case 3:  // points of the world; cubics and quintics matter most
+      if (width_ == 6) return apply_rows<3, 6>(*this, blocks, stride, out);
+      if (width_ == 4) return apply_rows<3, 4>(*this, blocks, stride, out);
       return apply_rows<3>(*this, blocks, stride, out);
     case 4:
       return apply_rows<4>(*this, blocks, stride, out);

@@ -180,6 +180,28 @@ CompactRows collocation_matrix(const KnotVector& knots, const std::vector<double
   return A;
 }
 
+std::vector<CompactRows> collocation_matrices(const KnotVector& knots,
+                                              const std::vector<double>& parameters,
+                                              int derivatives) {
+  EXPECTS(derivatives >= 0 && derivatives <= KnotVector::kMaxDegree);
+  const int order = knots.order();
+  const int rows = static_cast<int>(parameters.size());
+  std::vector<CompactRows> matrices(static_cast<std::size_t>(derivatives) + 1,
+                                    CompactRows(rows, knots.control_point_count(), order));
+  std::vector<double> basis(static_cast<std::size_t>(order * (derivatives + 1)));
+  int span = -1;
+  for (int r = 0; r < rows; ++r) {
+    const double t = parameters[static_cast<std::size_t>(r)];
+    span = knots.span(t, span);
+    basis_on_span(knots, span, t, derivatives, basis.data());
+    for (int d = 0; d <= derivatives; ++d) {
+      matrices[static_cast<std::size_t>(d)].set_row(r, span - knots.degree(),
+                                                    basis.data() + d * order, order);
+    }
+  }
+  return matrices;
+}
+
 std::optional<Error> schoenberg_whitney_violation(const KnotVector& knots,
                                                   const std::vector<double>& parameters) {
   EXPECTS(static_cast<int>(parameters.size()) == knots.control_point_count());

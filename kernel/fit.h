@@ -17,6 +17,11 @@ namespace angiospline {
 CompactRows collocation_matrix(const KnotVector& knots, const std::vector<double>& parameters,
                                int derivative = 0);
 
+// The same for the derivatives 0 .. derivatives, each basis computed once.
+std::vector<CompactRows> collocation_matrices(const KnotVector& knots,
+                                              const std::vector<double>& parameters,
+                                              int derivatives);
+
 // Schoenberg-Whitney: parameters[i] must lie inside the support of basis function i (at a clamped
 // end also on it) for interpolation to have exactly one solution. Returns the error that names the
 // first violated pair, or nothing. Requires increasing parameters, one for each control point.

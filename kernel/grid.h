@@ -22,15 +22,16 @@ struct SurfaceGrid {
 
   // d^(a+b) S / du^a dv^b at every grid point, a + b <= derivatives; point (i, j) is column
   // i * v_count + j. a = b = 0: the points.
-  const Points& partial(int a, int b) const {
-    return partials[static_cast<std::size_t>((a + b) * (a + b + 1) / 2 + b)];
+  const Points& partial(int a, int b) const { return partials[place(a, b)]; }
+  static std::size_t place(int a, int b) {
+    return static_cast<std::size_t>((a + b) * (a + b + 1) / 2 + b);
   }
   const Points& points() const { return partials.front(); }
 };
 
 // All partials up to total order `derivatives` at (us[i], vs[j]). The tensor structure is used:
-// basis functions are computed once for each parameter, and u is contracted before v. D is 1 to 4.
-// O(|us| |vs| order_v) after O(|us| v_count order_u). `storage`, an earlier grid, gives its memory.
+// basis functions are computed once for each parameter, and v is contracted before u. D is 1 to 4.
+// O(|us| |vs| order_u) after O(|vs| u_count order_v). `storage`, an earlier grid, gives its memory.
 template <int D>
 SurfaceGrid<D> evaluate_grid(const BSplineSurface<D>& surface, const std::vector<double>& us,
                              const std::vector<double>& vs, int derivatives = 0,

@@ -454,7 +454,7 @@ std::vector<double> Reducer::moved_to_error(const std::vector<double>& share,
 std::vector<double> Reducer::shares_of_best() const {
   const KnotVector& knots = best_->knots;
   std::vector<double> own = knot_weights(knots, best_->points.data(), stride_, problem_.group);
-  for (double& s : own) s = std::pow(s, 1.0 / (p_ + 1));
+  for (double& s : own) s = std::pow(s / problem_.tolerance, 1.0 / (p_ + 1));
   std::vector<double> breaks{knots.first()};
   std::vector<double> mass{0.0};
   for (std::size_t k = 0; k < own.size(); ++k) {
@@ -551,7 +551,7 @@ DirectionResult Reducer::run() {
     weigh_knots();
     search_heaviest();
     std::vector<double> share = weight_;
-    for (double& s : share) s = std::pow(s, 1.0 / (p_ + 1));
+    for (double& s : share) s = std::pow(s / problem_.tolerance, 1.0 / (p_ + 1));
     if (hopeless()) return unreduced();
     search_shares(share);
     if (!best_) search_ranks();

@@ -12,6 +12,12 @@
 
 namespace angiospline {
 
+// Spans of the knot vectors in u and v; -1: none known.
+struct SpanHint {
+  int u = -1;
+  int v = -1;
+};
+
 // Knot vectors in u and v and a net of control points. Control point (i, j), i along u and j along
 // v, is column i * v_count + j. Rational surfaces are held homogeneous, one dimension higher.
 template <int D>
@@ -34,10 +40,17 @@ class BSplineSurface {
   Eigen::Index index(int i, int j) const { return static_cast<Eigen::Index>(i) * v_count() + j; }
   Point control_point(int i, int j) const { return control_points_.col(index(i, j)); }
 
-  // The mixed derivative d^(a+b) S / du^a dv^b at (u, v); a = b = 0: the point.
+  // The mixed derivative d^(a+b) S / du^a dv^b at (u, v); a = b = 0: the point. The caller may hold
+  // a hint, the spans of the last call or any others: right ones save the search, and the spans
+  // found are written back. The result does not depend on it. No allocation.
   Point at(double u, double v, int a = 0, int b = 0) const {
-    const BasisValues bu = basis_at(u_, u, a);
-    const BasisValues bv = basis_at(v_, v, b);
+    SpanHint hint;
+    return at(u, v, hint, a, b);
+  }
+  Point at(double u, double v, SpanHint& hint, int a = 0, int b = 0) const {
+    const BasisValues bu = basis_at(u_, u, a, hint.u);
+    const BasisValues bv = basis_at(v_, v, b, hint.v);
+    hint = {bu.first + u_.degree(), bv.first + v_.degree()};
     Point sum = Point::Zero();
     for (int i = 0; i < u_.order(); ++i) {
       const auto row = control_points_.middleCols(index(bu.first + i, bv.first), v_.order());

@@ -150,29 +150,5 @@ TEST(GramMatrix, IntegratesProductsOfDerivatives) {
   EXPECT_EQ(gram_matrix(knots, 4).to_dense().cwiseAbs().maxCoeff(), 0);
 }
 
-TEST(EvaluateGrid, AgreesWithPointwiseEvaluation) {
-  Random random(6);
-  for (int round = 0; round < 30; ++round) {
-    const KnotVector u = random_knots(random, 1 + random.below(6));
-    const KnotVector v = random_knots(random, 1 + random.below(6));
-    const BSplineSurface<3> surface = random_surface<3>(random, u, v);
-    const auto us = spaced(u.first(), u.last(), 7);
-    const auto vs = spaced(v.first(), v.last(), 5);
-    const auto grid = evaluate_grid(surface, us, vs, 3);
-    for (int i = 0; i < 7; ++i) {
-      for (int j = 0; j < 5; ++j) {
-        for (int a = 0; a <= 3; ++a) {
-          for (int b = 0; a + b <= 3; ++b) {
-            const Eigen::Vector3d wanted =
-                surface.at(us[static_cast<std::size_t>(i)], vs[static_cast<std::size_t>(j)], a, b);
-            EXPECT_LE((grid.partial(a, b).col(i * 5 + j) - wanted).norm(),
-                      1e-13 * (1 + wanted.norm()) * 100);
-          }
-        }
-      }
-    }
-  }
-}
-
 }  // namespace
 }  // namespace angiospline
