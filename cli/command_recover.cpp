@@ -1,4 +1,6 @@
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -10,6 +12,8 @@
 #include "io/centerline_export.h"
 #include "io/certificate_json.h"
 #include "io/report_html.h"
+#include "recovery/morphology.h"
+#include "recovery/topology_numbers.h"
 
 namespace angiospline::cli {
 namespace {
@@ -59,10 +63,27 @@ Result<void> write_stage_files(const OutputFolder& folder, const Mask& mask,
   return written;
 }
 
+// A seed in noise or tissue floods the image. Vessels fill a small part of it and have few loops; a
+// network of capillaries has many, but fills little.
+std::optional<Error> flooded(const Mask& mask, const std::string& image) {
+  constexpr double kShare = 0.2, kFull = 0.9;
+  constexpr std::int64_t kLoops = 100;
+  const double share =
+      static_cast<double>(voxel_count(mask)) / static_cast<double>(mask.grid.voxel_count());
+  if (share <= kShare) return std::nullopt;
+  const std::int64_t loops = topology_numbers(mask).cycles;
+  if (loops <= kLoops && share < kFull) return std::nullopt;
+  return Error{ErrorKind::kBadInput, "there is no vessel at the seeds, or it leaks", image,
+               fmt::format("what grows from them fills {:.0f} % of the image and has {} loops",
+                           100 * share, loops),
+               "give other seeds or a higher background threshold; `segment` writes the mask"};
+}
+
 Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder& folder,
                           const Progress& progress, Stopwatch& watch) {
   auto segmented = segment_image(arguments.segment, progress, watch);
   if (!segmented) return fail(segmented.error());
+  if (auto error = flooded(segmented->mask, arguments.segment.image)) return fail(*error);
   VesselsOptions options;
   if (arguments.root_mm) options.roots_mm.push_back(*arguments.root_mm);
   auto vessels = vessels_from_mask(segmented->mask, options, progress);

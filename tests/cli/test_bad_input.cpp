@@ -1,5 +1,6 @@
 // Bad input gets one line on stderr that names file, place, value and rule; exit code 2; no file
 // left.
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -176,6 +177,25 @@ TEST_F(RecoverRefuses, ASeedWhereThereIsNoVessel) {
   expect_refusal(
       {"recover", folder_ / "image.nrrd", "--seed-voxel", "1,1,1", "-o", folder_ / "out"},
       {"seed"});
+}
+
+TEST_F(RecoverRefuses, ASeedFromWhichTheImageIsFlooded) {
+  std::string noise(40 * 40 * 40, '\0');
+  std::uint32_t state = 1;  // a linear congruential generator: the same noise everywhere
+  for (char& voxel : noise) {
+    state = state * 1664525U + 1013904223U;
+    voxel = static_cast<char>(100 + (state >> 28U));
+  }
+  folder_.write("noise.mha",
+                "ObjectType = Image\nNDims = 3\nDimSize = 40 40 40\nElementType = MET_UCHAR\n"
+                "ElementDataFile = LOCAL\n" +
+                    noise);
+  for (const char* deviations : {"3", "9"}) {  // full of tunnels; full
+    expect_refusal({"recover", folder_ / "noise.mha", "--seed-voxel", "20,20,20", "--smooth", "0",
+                    "--background", deviations[0] == '3' ? "106" : "100", "--neighborhood", "3",
+                    "--deviations", deviations, "-o", folder_ / "out"},
+                   {"noise.mha", "no vessel at the seeds", "loops"});
+  }
 }
 
 TEST_F(RecoverRefuses, AnImageThatIsMissingEmptyOrTruncated) {
