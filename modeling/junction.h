@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "base/result.h"
 #include "modeling/surface_network.h"
 
@@ -43,8 +44,9 @@ struct Junction {
   double jacobian_ratio = 0.0;            // least |Su x Sv| over its mean on the same patch
   double curvature_times_radius = 0.0;    // largest curvature times the smallest branch radius
   double distance_over_radius = 0.0;      // from the union of cylinders, over the smallest radius
+  double moved_over_radius = 0.0;         // by making it continuous, along normals, likewise
   bool fair = true;  // curvature below 20 over, distance below half, the smallest radius
-  int attempts = 1;  // settings tried before one passed every gate
+  int attempts = 1;  // settings tried
 };
 
 struct JunctionOptions {
@@ -54,14 +56,15 @@ struct JunctionOptions {
 };
 
 // How far from the centre each branch's opening comes to lie, in mm; the order of the spec.
-// Errors: fewer than three branches or more than 24, a radius that is not positive and finite, two branches in the
-// same direction; each names the junction and the branches.
+// Errors: fewer than three branches or more than 24, a radius that is not positive and finite, two
+// branches in the same direction; each names the junction and the branches.
 Result<std::vector<double>> opening_distances_mm(const JunctionSpec& spec,
                                                  const JunctionOptions& options = {});
 
 // The junction's patches. Errors: those of opening_distances_mm; a branch too short for its
 // opening; no setting gives a surface that passes every gate (the message names the best try's
-// failure).
-Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options = {});
+// failure); stopped on request.
+Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options = {},
+                               const Progress& progress = {});
 
 }  // namespace angiospline

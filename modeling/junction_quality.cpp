@@ -26,6 +26,10 @@ constexpr double kLeastJacobianRatio = 0.03;
 constexpr double kMostOffTargetDeg = 60;
 constexpr double kFairCurvature = 20;
 constexpr double kFairDistance = 0.5;
+constexpr double kGoodAngleDeg = 1e-6;
+constexpr double kGoodCurvature = 8;  // gentle enough whatever the target
+constexpr double kSharperThanTarget = 1.2;
+constexpr double kStep = 1e-4;  // of differences of normals, in smallest radii
 
 using PatchPoints = Eigen::Matrix<double, 3, kPoints>;
 
@@ -65,6 +69,21 @@ double largest_curvature(const Derivatives& d, const Vec3& n) {
   const double area = E * G - F * F;
   const double H = (E * N - 2 * F * M + G * L) / (2 * area);
   const double K = (L * N - M * M) / area;
+  return std::abs(H) + std::sqrt(std::max(0.0, H * H - K));
+}
+
+// Of the level set of the target through x, by differences of its normals.
+double target_curvature(const JunctionTarget& target, const Vec3& x, double step) {
+  const Vec3 n = target.foot(x).normal;
+  const Vec3 a = n.unitOrthogonal();
+  const Vec3 b = n.cross(a);
+  const auto slope = [&](const Vec3& d) {
+    return Vec3((target.foot(x + step * d).normal - target.foot(x - step * d).normal) / (2 * step));
+  };
+  const Vec3 da = slope(a);
+  const Vec3 db = slope(b);
+  const double H = (a.dot(da) + b.dot(db)) / 2;
+  const double K = a.dot(da) * b.dot(db) - a.dot(db) * b.dot(da);
   return std::abs(H) + std::sqrt(std::max(0.0, H * H - K));
 }
 
@@ -153,7 +172,19 @@ JunctionQuality measure(const JunctionTopology& topology, const JunctionTarget* 
 
 JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionTarget& target,
                                  const JunctionNet& net) {
-  return measure(topology, &target, net);
+  JunctionQuality q = measure(topology, &target, net);
+  if (!is_fair(q) || q.curvature_times_radius <= kGoodCurvature) return q;
+  const double smallest = *std::min_element(net.scale.begin(), net.scale.end());
+  const auto basis = basis_table(kGrid);
+  for (int p = 0; p < static_cast<int>(topology.patches.size()); ++p) {
+    const PatchPoints P = patch_points(net, p);
+    for (int k = 0; k < kGrid * kGrid; ++k) {
+      const Vec3 x = evaluate(P, basis[at(k / kGrid)], basis[at(k % kGrid)]).s;
+      q.target_curvature =
+          std::max(q.target_curvature, smallest * target_curvature(target, x, kStep * smallest));
+    }
+  }
+  return q;
 }
 
 JunctionQuality junction_quality(const JunctionTopology& topology, const JunctionNet& net) {
@@ -174,11 +205,37 @@ Points3 junction_normals(const JunctionTopology& topology, const JunctionNet& ne
   return normals;
 }
 
+double surface_move(const JunctionTopology& topology, const JunctionNet& net,
+                    const Points3& before) {
+  const auto basis = basis_table(kGrid);
+  const double smallest = *std::min_element(net.scale.begin(), net.scale.end());
+  JunctionNet old = net;
+  old.points = before;
+  double farthest = 0;
+  for (int p = 0; p < static_cast<int>(topology.patches.size()); ++p) {
+    const PatchPoints P = patch_points(net, p);
+    const PatchPoints Q = patch_points(old, p);
+    for (int k = 0; k < kGrid * kGrid; ++k) {
+      const Derivatives d = evaluate(P, basis[at(k / kGrid)], basis[at(k % kGrid)]);
+      const Vec3 n = d.su.cross(d.sv).normalized();
+      const Vec3 was = evaluate(Q, basis[at(k / kGrid)], basis[at(k % kGrid)]).s;
+      farthest = std::max(farthest, std::abs(n.dot(d.s - was)));
+    }
+  }
+  return farthest / smallest;
+}
+
 bool is_sound(const JunctionQuality& q) { return failed_gate(q).empty(); }
 
 bool is_fair(const JunctionQuality& q) {
   return is_sound(q) && q.curvature_times_radius < kFairCurvature &&
          q.distance_to_union < kFairDistance;
+}
+
+bool is_faithful(const JunctionQuality& q) {
+  return is_fair(q) && q.worst_angle_deg <= kGoodAngleDeg &&
+         q.curvature_times_radius <=
+             std::max(kGoodCurvature, kSharperThanTarget * q.target_curvature);
 }
 
 std::string failed_gate(const JunctionQuality& q) {

@@ -14,7 +14,8 @@ struct JunctionQuality {
   double jacobian_ratio = 0.0;   // least |Su x Sv| over its mean on the same patch
   double normal_off_target_deg = 0.0;   // largest angle to the target's normal
   double curvature_times_radius = 0.0;  // largest curvature times the smallest radius
-  double distance_to_union = 0.0;       // from the branches' cylinders, over the smallest radius
+  double target_curvature = 0.0;   // the target's at the same places; 0 where the surface's is good
+  double distance_to_union = 0.0;  // from the branches' cylinders, over the smallest radius
   bool self_intersecting = false;
 };
 
@@ -32,6 +33,14 @@ Points3 junction_normals(const JunctionTopology& topology, const JunctionNet& ne
 // Limits of what is usable at all, and of what is also a fair surface.
 bool is_sound(const JunctionQuality& quality);
 bool is_fair(const JunctionQuality& quality);
+
+// Fair and not notably sharper than the target: a further try could hardly be better.
+bool is_faithful(const JunctionQuality& quality);
+
+// The farthest way of the surface along its normals when its control points came from `before`, at
+// the same parameters, over the smallest radius.
+double surface_move(const JunctionTopology& topology, const JunctionNet& net,
+                    const Points3& before);
 
 // The first gate the surface does not pass, with value and limit; empty when it is sound.
 std::string failed_gate(const JunctionQuality& quality);

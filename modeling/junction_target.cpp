@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -17,6 +18,10 @@ namespace {
 constexpr double kNegligible = 25.0;
 // The ray's start is rounded over this part of the radius, so that gradients have no kinks.
 constexpr double kRoundedStart = 0.25;
+// Pairs at this angle or less have the rounding asked for, at kWide or more 1 + kRounder times it.
+constexpr double kAcute = 30 * std::numbers::pi / 180;
+constexpr double kWide = 50 * std::numbers::pi / 180;
+constexpr double kRounder = 0.6;
 constexpr std::size_t kMostActive = 24;  // branches of one target
 
 // A number and its gradient in space.
@@ -94,7 +99,10 @@ JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend,
       // A crotch of half angle h has curvature cos^2 h / (k sin h).
       const double half = std::acos(std::clamp(a.direction.dot(b.direction), -1.0, 1.0)) / 2;
       const double cosine = std::cos(half);
-      widths_(i, j) = std::max(blend * r, rounding * r * cosine * cosine / std::sin(half));
+      // Wide pairs have the room for a rounder one.
+      const double wide = std::clamp((2 * half - kAcute) / (kWide - kAcute), 0.0, 1.0);
+      const double radius = (1 + kRounder * wide) * rounding * r;
+      widths_(i, j) = std::max(blend * r, radius * cosine * cosine / std::sin(half));
     }
   }
 }

@@ -27,21 +27,31 @@ struct Setting {
   int sweeps = 60;
 };
 
-constexpr std::array<Setting, 8> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60},
-                                          {1.0, 1.0, 0.5, 5.0, 0.0, 8},
-                                          {1.5, 1.3, 0.5, 5.0, 0.5, 60},
-                                          {1.5, 1.3, 0.5, 5.0, 0.0, 8},
-                                          {1.5, 1.5, 0.2, 10.0, 0.0, 60},
-                                          {0.7, 1.0, 1.0, 2.0, 0.5, 30},
-                                          {1.0, 1.5, 0.1, 5.0, 0.5, 60},
-                                          {2.0, 2.0, 0.5, 5.0, 0.0, 20}}};
+constexpr std::array<Setting, 10> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60},
+                                           {1.5, 1.3, 0.5, 5.0, 0.5, 60},
+                                           {1.5, 1.3, 0.5, 5.0, 0.0, 8},
+                                           {1.0, 1.0, 1.5, 5.0, 0.5, 60},
+                                           {1.0, 1.0, 0.5, 10.0, 0.5, 60},
+                                           {1.0, 1.0, 0.5, 5.0, 0.0, 8},
+                                           {1.5, 1.5, 0.2, 10.0, 0.0, 60},
+                                           {0.7, 1.0, 1.0, 2.0, 0.5, 30},
+                                           {1.0, 1.5, 0.1, 5.0, 0.5, 60},
+                                           {2.0, 2.0, 0.5, 5.0, 0.0, 20}}};
+constexpr int kMoreTries = 3;  // for a fair surface that is sharper than its target
 
 struct Attempt {
   JunctionTopology topology;
   JunctionLayout layout;
   JunctionNet net;
   JunctionQuality quality;
+  double moved;
 };
+
+// Of two sound surfaces.
+bool is_better(const JunctionQuality& a, const JunctionQuality& b) {
+  if (is_fair(a) != is_fair(b)) return is_fair(a);
+  return a.curvature_times_radius < b.curvature_times_radius;
+}
 
 Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
   std::vector<Vec3> directions;
@@ -56,8 +66,9 @@ Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
   layout_options.coarse_sweeps = setting.sweeps;
   const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
   SmoothedNet smooth = smooth_junction(topology, target, layout);
-  JunctionQuality quality = junction_quality(topology, target, smooth.net);
-  return {std::move(topology), layout, std::move(smooth.net), quality};
+  const JunctionQuality quality = junction_quality(topology, target, smooth.net);
+  const double moved = surface_move(topology, smooth.net, smooth.free_points);
+  return {std::move(topology), layout, std::move(smooth.net), quality, moved};
 }
 
 SurfaceNetwork make_network(const JunctionSpec& spec, const OpeningPlan& plan,
@@ -102,6 +113,7 @@ Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const At
   junction.jacobian_ratio = best.quality.jacobian_ratio;
   junction.curvature_times_radius = best.quality.curvature_times_radius;
   junction.distance_over_radius = best.quality.distance_to_union;
+  junction.moved_over_radius = best.moved;
   junction.fair = is_fair(best.quality);
   junction.attempts = attempts;
   return junction;
@@ -109,24 +121,26 @@ Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const At
 
 }  // namespace
 
-Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options) {
+Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options,
+                               const Progress& progress) {
   const Result<OpeningPlan> plan = plan_openings(spec, options);
   if (!plan) return fail(plan.error());
-  std::optional<Attempt> sound;
+  std::optional<Attempt> best;  // a fair one, otherwise a sound one, otherwise none
   std::string why;
   int attempts = 0;
+  int more = kMoreTries;
   for (const Setting& setting : kLadder) {
+    if (progress.should_stop()) return fail(cancelled("junction " + spec.name));
+    if (best && is_fair(best->quality) && more-- == 0) break;
     ++attempts;
     Attempt now = attempt(*plan, setting);
-    if (is_fair(now.quality)) return make_result(spec, *plan, now, attempts);
-    if (is_sound(now.quality) &&
-        (!sound || now.quality.curvature_times_radius < sound->quality.curvature_times_radius)) {
-      sound = std::move(now);
-    } else if (why.empty()) {
-      why = failed_gate(now.quality);
+    if (why.empty()) why = failed_gate(now.quality);
+    if (is_sound(now.quality) && (!best || is_better(now.quality, best->quality))) {
+      best = std::move(now);
     }
+    if (best && is_faithful(best->quality)) break;
   }
-  if (sound) return make_result(spec, *plan, *sound, attempts);
+  if (best) return make_result(spec, *plan, *best, attempts);
   std::string names;
   for (const JunctionBranch& b : spec.branches) names += (names.empty() ? "" : ", ") + b.name;
   return fail({ErrorKind::kFailed, "no setting gives a smooth junction",

@@ -53,18 +53,20 @@ bool same(const JunctionSpec& a, const JunctionSpec& b) {
 }
 
 // The junction with the options asked for; if that fails, with openings farther out.
-BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& options) {
+BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& options,
+                             const Progress& progress) {
   BuiltJunction built{node.spec, {}, node.error};
   if (node.error) return built;
   for (const double margin : {1.0, 1.6}) {
     JunctionOptions tried = options;
     tried.margin *= margin;
-    Result<Junction> junction = make_junction(node.spec, tried);
+    Result<Junction> junction = make_junction(node.spec, tried, progress);
     if (junction) {
       built.junction = std::move(*junction);
       built.error.reset();
       return built;
     }
+    if (progress.should_stop()) return built;
     if (!built.error) built.error = junction.error();
   }
   return built;
@@ -97,6 +99,7 @@ class Seeder {
     model.warnings = tree_.warnings;
     model.warnings.insert(model.warnings.end(), plan_.warnings().begin(), plan_.warnings().end());
     model.warnings.insert(model.warnings.end(), warnings_.begin(), warnings_.end());
+    warn_of_unfair_junctions(model);
     model.failed = std::move(failed_);
     progress_.at("assemble", 1.0);
     return model;
@@ -116,7 +119,8 @@ class Seeder {
       std::atomic<std::size_t> done{0};
       tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
         if (progress_.should_stop()) return;
-        built_[index(work[k])] = build_junction(plan_.nodes()[index(work[k])], options_.junction);
+        built_[index(work[k])] =
+            build_junction(plan_.nodes()[index(work[k])], options_.junction, progress_);
         progress_.at("junctions", static_cast<double>(++done) / static_cast<double>(work.size()));
       });
       if (progress_.should_stop()) return false;
@@ -160,6 +164,17 @@ class Seeder {
         failed_.push_back(
             {"junction_" + node.name, built_[n].error ? built_[n].error->message() : "not built"});
       }
+    }
+  }
+
+  void warn_of_unfair_junctions(Model& model) const {
+    for (const Junction& junction : junctions_) {
+      if (junction.fair) continue;
+      model.warnings.push_back(fmt::format(
+          "{} is smooth but not fair: its curvature times the smallest radius is {:.3g}, and it "
+          "departs from its branches by {:.2g} of that radius (below 20 and 0.5 are fair)",
+          junction.network.regions.front().name, junction.curvature_times_radius,
+          junction.distance_over_radius));
     }
   }
 

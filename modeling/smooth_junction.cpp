@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kEquationShift = 1e-12;     // -eps in the corner of the KKT matrix
 constexpr double kCoefficientWeight = 1e-3;  // keeps rho and nu determined
-constexpr EnergyWeights kInPlaceWeights{0.0, 0.0, 1.0, 1e-5};
+constexpr EnergyWeights kInPlaceWeights{0.0, 0.0, 1.0, 1e-5, 1.0};
 constexpr double kSolved = 1e-13;  // largest residual that counts as zero, in radii
 
 // One junction's sequence of steps on one sparse pattern.
@@ -144,6 +144,7 @@ void smooth(const JunctionTopology& topology, const JunctionTarget* target,
   for (int k = 0; k < weights.free_steps; ++k) {
     if (!took(solver.free_step(weights.energy))) return;
   }
+  result.free_points = result.net.points;
   solver.restart_coefficients();
   for (int k = 0; k < weights.most_steps; ++k) {
     const double move = solver.constrained_step(weights.energy);
@@ -164,7 +165,7 @@ void smooth(const JunctionTopology& topology, const JunctionTarget* target,
 
 SmoothedNet smooth_junction(const JunctionTopology& topology, const JunctionTarget& target,
                             const JunctionLayout& layout, const SmoothingWeights& weights) {
-  SmoothedNet result{start_net(topology, layout), 0.0, 0, true};
+  SmoothedNet result{start_net(topology, layout), {}, 0.0, 0, true};
   smooth(topology, &target, layout, weights, result);
   return result;
 }
@@ -174,7 +175,7 @@ SmoothedNet smooth_in_place(const JunctionTopology& topology, const JunctionLayo
   SmoothingWeights weights;
   weights.energy = kInPlaceWeights;
   weights.fit_steps = weights.free_steps = 0;
-  SmoothedNet result{std::move(start), 0.0, 0, true};
+  SmoothedNet result{std::move(start), {}, 0.0, 0, true};
   smooth(topology, nullptr, layout, weights, result);
   return result;
 }

@@ -59,6 +59,7 @@ TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarge
         }
       }
       // Samples on edges belong to two patches.
+      beside_pole_.push_back((last - i) + std::min(j, last - j) <= 1);
       sample_weights_(s) = (i == last ? 0.5 : 1.0) * (j == 0 || j == last ? 0.5 : 1.0);
     }
   }
@@ -110,7 +111,8 @@ void TargetEnergy::update_patch(int p, const JunctionNet& net, const EnergyWeigh
   for (int s = 0; s < samples; ++s) {
     const int node = layout_.grid.at(p, 1 + s / (last + 1), s % (last + 1));
     anchors.col(s) = layout_.nodes.col(node);
-    const double w = std::sqrt(sample_weights_(s));
+    const double pole = beside_pole_[at(s)] ? weights.pole : 1.0;
+    const double w = std::sqrt(pole * sample_weights_(s));
     JunctionTarget::Foot foot{0, layout_.normals.col(node)};
     if (weights.distance > 0) foot = target_->foot(S.col(s));
     normals.col(s) = foot.normal;

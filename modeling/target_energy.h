@@ -19,10 +19,11 @@ struct EnergyWeights {
   double tangent = 1.0;      // sines between Su, Sv and the target's tangent plane
   double anchor = 0.01;      // from the layout's node of the same parameters
   double roughness = 0.003;  // second differences of the control net
+  double pole = 4.0;         // of samples beside a pole, against 1 elsewhere
 };
 
 // Weights for fitting the layout itself.
-inline constexpr EnergyWeights kFitWeights{0.0, 0.1, 1.0, 0.001};
+inline constexpr EnergyWeights kFitWeights{0.0, 0.1, 1.0, 0.001, 1.0};
 
 // The unknowns a patch depends on, and its share of the Hessian (lower triangle) and gradient.
 struct PatchModel {
@@ -54,6 +55,7 @@ class TargetEnergy {
   std::vector<Eigen::VectorXd> scales_;  // local radius at each sample of a patch
   Eigen::MatrixXd b_, bu_, bv_;          // 36 x samples
   Eigen::VectorXd sample_weights_;
+  std::vector<char> beside_pole_;  // whether a sample is a pole or next to one
   Eigen::MatrixXd roughness_;  // 36 x 36
 };
 
