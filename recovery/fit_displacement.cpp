@@ -1,0 +1,304 @@
+#include "recovery/fit_displacement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <tbb/parallel_for.h>
+
+#include "base/contract.h"
+
+namespace angiospline {
+namespace {
+
+constexpr double kBestSnr = 20.0;        // beyond it other errors than noise count
+constexpr double kNeighbourRise = 0.35;  // of the contrast: grey that is another vessel's
+constexpr double kNoiseRise = 4.0;       // standard deviations of noise that are no vessel
+constexpr double kOutsideWave = 5.0;     // radii over which the background may vary
+constexpr double kInsideMean = 8.0;      // radii over which the inside is averaged
+constexpr int kLevelRounds = 2;          // the second without the first one's outliers
+constexpr double kLevelMean = 3.0;       // radii over which the wall is averaged for the levels
+constexpr double kNodeNoise = 0.65;  // of a voxel's noise left by interpolation across a profile
+constexpr double kOutlier = 3.0;     // standard deviations from which a value counts less
+constexpr double kLeastContrast = 0.25;  // of the median: less is no wall
+constexpr double kWaveVox = 32.0;        // L of SNR 1
+constexpr double kWaveExponent = -0.4;
+constexpr double kWaveRadii = 2.5;       // the longest L of factor one
+constexpr double kNormalScale = 1.4826;  // median absolute deviation to standard deviation
+
+std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// A node where it has come to, with the curvatures of the parallel surface.
+WallPoint moved(const WallPoint& node, double d) {
+  WallPoint p = node;
+  p.point_mm += d * node.normal;
+  const auto parallel = [&](double curvature) {
+    const double growth = 1 + curvature * d;
+    return growth > 0.2 ? curvature / growth : curvature / 0.2;
+  };
+  p.largest_curvature = parallel(node.largest_curvature);
+  p.smallest_curvature = parallel(node.smallest_curvature);
+  return p;
+}
+
+std::vector<WallSides> all_sides(const GreyField& field, const FitMesh& mesh,
+                                 const Eigen::VectorXd& displacement, double gate) {
+  std::vector<WallSides> sides(mesh.nodes.size());
+  tbb::parallel_for(std::size_t{0}, sides.size(), [&](std::size_t k) {
+    const WallPoint p = moved(mesh.nodes[k], displacement(static_cast<Eigen::Index>(k)));
+    sides[k] = wall_sides(field, p, gate);
+  });
+  return sides;
+}
+
+// The voxel nearest to a place; nothing beyond the image.
+double voxel_at(const GreyField& field, const Vec3& p) {
+  const Vec3 x = field.image().grid.index_vox(p);
+  const Voxel v{static_cast<int>(std::lround(x(0))), static_cast<int>(std::lround(x(1))),
+                static_cast<int>(std::lround(x(2)))};
+  return field.image().grid.contains(v) ? static_cast<double>(field.image()[v])
+                                        : std::numeric_limits<double>::quiet_NaN();
+}
+
+double deviation_of(std::vector<double> residuals) {
+  for (double& r : residuals) r = std::abs(r);
+  return kNormalScale * median(std::move(residuals));
+}
+
+// Deviation of voxels two widths outside the wall from one level: noise, and the background's own
+// variation.
+double noise_beyond(const GreyField& field, const FitMesh& mesh,
+                    const Eigen::VectorXd& displacement, double level) {
+  std::vector<double> residuals;
+  for (std::size_t k = 0; k < mesh.nodes.size(); ++k) {
+    const WallPoint p = moved(mesh.nodes[k], displacement(static_cast<Eigen::Index>(k)));
+    const double grey = voxel_at(field, p.point_mm + 2 * field.width_mm(p.normal) * p.normal);
+    if (std::isfinite(grey)) residuals.push_back(grey - level);
+  }
+  return deviation_of(std::move(residuals));
+}
+
+// Lets values far from the smooth ones count less; true if there was a scale to judge by.
+void weigh_outliers(const Eigen::VectorXd& residual, const Eigen::VectorXd& base, double floor,
+                    Eigen::VectorXd& weights) {
+  std::vector<double> known;
+  for (Eigen::Index k = 0; k < base.size(); ++k) {
+    if (base(k) > 0) known.push_back(residual(k));
+  }
+  const double reach = kOutlier * std::max(floor, deviation_of(known));
+  for (Eigen::Index k = 0; k < base.size(); ++k) {
+    const double r = residual(k) / reach;
+    weights(k) = reach > 0 ? base(k) / std::max(1.0, r * r) : base(k);
+  }
+}
+
+}  // namespace
+
+double WallGreys::snr() const {
+  return noise * kBestSnr > std::abs(contrast) ? std::abs(contrast) / noise : kBestSnr;
+}
+
+WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
+                     const Eigen::VectorXd& displacement) {
+  const Eigen::Index n = mesh.size();
+  std::vector<double> in, out;
+  std::vector<WallSides> sides =
+      all_sides(field, mesh, displacement, std::numeric_limits<double>::infinity());
+  for (const WallSides& s : sides) {
+    if (s.inside_weight > 0) in.push_back(s.inside);
+    if (s.outside_weight > 0) out.push_back(s.outside);
+  }
+  if (in.empty()) {  // nothing but thin vessels: their middles, of which the brighter half is purer
+    for (const WallPoint& node : mesh.nodes) {
+      if (node.largest_curvature > 0) {
+        in.push_back(field.at(node.point_mm - 0.9 / node.largest_curvature * node.normal));
+      }
+    }
+  }
+  const double inside = median(in);
+  const double outside = median(out);
+  const double noise = noise_beyond(field, mesh, displacement, outside);
+  const double gate = std::max(kNeighbourRise * std::abs(inside - outside), kNoiseRise * noise);
+  sides = all_sides(field, mesh, displacement, gate);
+
+  Eigen::VectorXd inner(n), outer(n), inner_weight(n), outer_weight(n), waves(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const WallSides& s = sides[at(k)];
+    inner(k) = s.inside - inside;
+    outer(k) = s.outside - outside;
+    inner_weight(k) = mesh.near_rim[at(k)] ? 0.0 : s.inside_weight;
+    outer_weight(k) = mesh.near_rim[at(k)] ? 0.0 : s.outside_weight;
+    waves(k) = kOutsideWave * mesh.radii_mm[at(k)];
+  }
+  const double radius = median(mesh.radii_mm);
+  WallGreys greys;
+  Eigen::VectorXd w_in = inner_weight, w_out = outer_weight;
+  for (int round = 0; round < kLevelRounds; ++round) {
+    greys.inside = smoother.mean(inner, w_in, kInsideMean * radius);
+    greys.outside = smoother.fair(outer, w_out, waves);
+    weigh_outliers(inner - greys.inside, inner_weight, 0.0, w_in);
+    weigh_outliers(outer - greys.outside, outer_weight, 0.0, w_out);
+  }
+  greys.inside.array() += inside;
+  greys.outside.array() += outside;
+  const Eigen::VectorXd contrast = greys.inside - greys.outside;
+  greys.contrast = median({contrast.data(), contrast.data() + n});
+
+  std::vector<double> residuals, beyond;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const WallPoint p = moved(mesh.nodes[at(k)], displacement(k));
+    const double width = field.width_mm(p.normal);
+    if (inner_weight(k) > 0) {
+      const double depth = std::min(1.6 * width, 0.9 / std::max(1e-300, p.largest_curvature));
+      const double grey = voxel_at(field, p.point_mm - depth * p.normal);
+      if (std::isfinite(grey)) residuals.push_back(grey - greys.inside(k));
+    }
+    if (outer_weight(k) > 0) {
+      const double grey = voxel_at(field, p.point_mm + 2 * width * p.normal);
+      if (std::isfinite(grey)) beyond.push_back(grey - greys.outside(k));
+    }
+  }
+  greys.noise = deviation_of(residuals.size() >= 50 ? std::move(residuals) : std::move(beyond));
+  return greys;
+}
+
+namespace {
+
+// One round's measurements.
+struct Offsets {
+  Eigen::VectorXd mm;
+  Eigen::VectorXd weight;
+};
+
+Offsets measure_offsets(const GreyField& field, const FitMesh& mesh, const WallGreys& greys,
+                        const Eigen::VectorXd& displacement, double half_window) {
+  Offsets all{Eigen::VectorXd::Zero(mesh.size()), Eigen::VectorXd::Zero(mesh.size())};
+  tbb::parallel_for(std::size_t{0}, mesh.nodes.size(), [&](std::size_t i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const WallLevels levels{greys.inside(k), greys.outside(k)};
+    const bool clear = levels.contrast() >= kLeastContrast * greys.contrast;
+    if (mesh.near_rim[i] || !clear) return;
+    const WallPoint p = moved(mesh.nodes[i], displacement(k));
+    const WallOffset offset =
+        wall_offset(field, p, levels, {half_window, std::min(greys.noise, greys.contrast)});
+    if (!offset.measured) return;
+    all.mm(k) = offset.offset_mm;
+    const double relative = levels.contrast() / greys.contrast;
+    all.weight(k) =
+        std::min(1.0, relative * relative) * 2 * half_window * field.voxel_mm() / offset.window_mm;
+  });
+  return all;
+}
+
+std::vector<double> region_evidence(const GreyField& field, const FitMesh& mesh,
+                                    const WallGreys& greys, const Eigen::VectorXd& displacement) {
+  const int regions = *std::max_element(mesh.regions.begin(), mesh.regions.end()) + 1;
+  std::vector<double> sum(at(regions), 0.0), count(at(regions), 0.0);
+  for (std::size_t k = 0; k < mesh.nodes.size(); ++k) {
+    const WallPoint p = moved(mesh.nodes[k], displacement(static_cast<Eigen::Index>(k)));
+    const double width = field.width_mm(p.normal);
+    const double in = std::min(width, 0.9 / std::max(1e-300, p.largest_curvature));
+    const Vec3 inner = p.point_mm - in * p.normal;
+    const Vec3 outer = p.point_mm + width * p.normal;
+    if (!field.covers(inner) || !field.covers(outer)) continue;
+    sum[at(mesh.regions[k])] += (field.at(inner) - field.at(outer)) / greys.contrast;
+    count[at(mesh.regions[k])] += 1;
+  }
+  for (std::size_t r = 0; r < sum.size(); ++r) sum[r] = count[r] > 0 ? sum[r] / count[r] : 0.0;
+  return sum;
+}
+
+}  // namespace
+
+namespace {
+
+// The factor with the least expected squared error: from the rule's own, up or down while it falls.
+void choose_wave(MeshSmoother& smoother, const Eigen::VectorXd& wanted,
+                 const Eigen::VectorXd& weights, const Eigen::VectorXd& waves, double density,
+                 const std::vector<double>& factors, Displacement& result) {
+  const Eigen::VectorXd mass = weights.cwiseProduct(smoother.mass_mm2());
+  std::vector<std::optional<std::pair<double, double>>> known(factors.size());
+  const auto expected = [&](int k) {
+    auto& value = known[at(k)];
+    if (!value) {
+      const Eigen::VectorXd smooth = smoother.fair(wanted, weights, factors[at(k)] * waves);
+      const double freedom = smoother.degrees_of_freedom();
+      value = {mass.dot((smooth - wanted).cwiseAbs2()) + 2 * density * freedom, freedom};
+    }
+    return value->first;
+  };
+  const int last = static_cast<int>(factors.size()) - 1;
+  int k = last / 2;
+  if (k < last && expected(k + 1) < expected(k)) {
+    while (k < last && expected(k + 1) < expected(k)) ++k;
+  } else {
+    while (k > 0 && expected(k - 1) < expected(k)) --k;
+  }
+  expected(k);
+  result.wave_factor = factors[at(k)];
+  result.degrees_of_freedom = known[at(k)]->second;
+}
+
+}  // namespace
+
+Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
+                               const DisplacementOptions& options, const Progress& progress) {
+  EXPECTS(mesh.size() > 0 && !options.half_windows_vox.empty());
+  const Eigen::Index n = mesh.size();
+  Displacement result;
+  result.normal_mm = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd waves(n), farthest(n);
+  for (std::size_t round = 0; round < options.half_windows_vox.size(); ++round) {
+    progress.at("wall",
+                static_cast<double>(round) / static_cast<double>(options.half_windows_vox.size()));
+    if (progress.should_stop()) return result;
+    const bool last = round + 1 == options.half_windows_vox.size();
+    if (round == 0 || last) {
+      // The levels are taken from a smoother wall: one that follows the noise would have bright
+      // noise inside and dark noise outside.
+      const Eigen::VectorXd broad = smoother.mean(result.normal_mm, Eigen::VectorXd::Ones(n),
+                                                  kLevelMean * median(mesh.radii_mm));
+      result.greys = wall_greys(field, mesh, smoother, broad);
+    }
+    if (!(result.greys.contrast > 0)) break;
+    const double wave = kWaveVox * std::pow(result.greys.snr(), kWaveExponent) * field.voxel_mm();
+    for (Eigen::Index k = 0; k < n; ++k) {
+      waves(k) = std::min(wave, kWaveRadii * mesh.radii_mm[at(k)]);
+      farthest(k) = options.largest_move_radii * mesh.radii_mm[at(k)];
+    }
+    const double half = options.half_windows_vox[round];
+    const Offsets offsets = measure_offsets(field, mesh, result.greys, result.normal_mm, half);
+    const Eigen::VectorXd wanted = result.normal_mm + offsets.mm;
+    Eigen::VectorXd weights = offsets.weight;
+    Eigen::VectorXd smooth = smoother.fair(wanted, weights, result.wave_factor * waves);
+    if (last) {
+      weigh_outliers(wanted - smooth, offsets.weight, 0.1 * field.voxel_mm(), weights);
+      const double relative = 1 / result.greys.snr();
+      // Nodes farther apart than voxels see only part of the image.
+      const double area =
+          std::max(field.voxel_mm() * field.voxel_mm(), kNodeNoise * smoother.mass_mm2().mean());
+      const double density =
+          relative * relative * 2 * half * area * field.voxel_mm() * field.voxel_mm();
+      choose_wave(smoother, wanted, weights, waves, density, options.wave_factors, result);
+      smooth = smoother.fair(wanted, weights, result.wave_factor * waves);
+    }
+    result.normal_mm = smooth.cwiseMin(farthest).cwiseMax(-farthest);
+    result.residual_mm = wanted - result.normal_mm;
+    result.weight = offsets.weight;
+  }
+  if (result.residual_mm.size() == 0) {
+    result.residual_mm = result.weight = Eigen::VectorXd::Zero(n);
+  }
+  result.evidence = region_evidence(field, mesh, result.greys, result.normal_mm);
+  return result;
+}
+
+}  // namespace angiospline

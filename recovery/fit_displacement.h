@@ -1,0 +1,53 @@
+// How far each node of a wall must move along its normal to lie on the wall that the image shows.
+#pragma once
+
+#include <vector>
+
+#include "recovery/fit_mesh.h"
+
+namespace angiospline {
+
+// Grey values on both sides of the wall at each node, and the noise.
+struct WallGreys {
+  Eigen::VectorXd inside;
+  Eigen::VectorXd outside;
+  double contrast = 0.0;  // median of inside - outside
+  double noise = 0.0;     // standard deviation of a voxel
+  double snr() const;     // contrast over noise, at most 20
+};
+
+// Robust and local: means of what lies one to three voxels from the wall, smooth over some five
+// radii outside (so that a background may rise across a vessel) and some eight inside; a vessel too
+// thin to have an inside takes its level from its neighbours. Other vessels beside it are left out.
+WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
+                     const Eigen::VectorXd& displacement_mm);
+
+struct DisplacementOptions {
+  std::vector<double> half_windows_vox{1.5, 1.0};  // of the profile, one for each round
+  // Waves that are tried, in multiples of the rule's own.
+  std::vector<double> wave_factors{0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
+  double largest_move_radii = 0.5;  // of any node from where the mesh has it
+};
+
+// The answer at each node, and what it rests on.
+struct Displacement {
+  Eigen::VectorXd normal_mm;     // smooth
+  Eigen::VectorXd residual_mm;   // what the image asks for beyond it, at the end
+  Eigen::VectorXd weight;        // 0: nothing was measured there
+  std::vector<double> evidence;  // of each region: grey just inside minus grey just outside, over
+                                 // the contrast of all; near 1 on a wall, near 0 away from any
+  WallGreys greys;
+  double wave_factor = 1.0;         // the one taken
+  double degrees_of_freedom = 0.0;  // of the smooth displacement
+};
+
+// Smooth displacements by iterated least squares. Each round measures the wall from where the nodes
+// have come to, always along the normals of the mesh, and fits the total displacement: waves
+// shorter than L = 32 SNR^-0.4 voxels (at most the radii stated, more where the noise is stronger
+// than a quarter) are left out, so that a second round is no rougher than the first. Outliers count
+// less.
+Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
+                               const DisplacementOptions& options = {},
+                               const Progress& progress = {});
+
+}  // namespace angiospline

@@ -1,0 +1,180 @@
+#include "recovery/fit_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "recovery/fit_capture.h"
+#include "recovery/fit_rings.h"
+
+namespace angiospline {
+namespace {
+
+constexpr double kEvidence = 0.25;     // of the contrast across a region's wall: less is no wall
+constexpr double kLeastCovered = 0.5;  // of the nodes: fewer in the image, and the frames differ
+
+std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
+// Displacements of a region without edge are zero, and so is the pull on its neighbours.
+void hold_regions(const FitMesh& mesh, const std::vector<char>& hold, Displacement& displacement) {
+  for (int k = 0; k < mesh.size(); ++k) {
+    if (hold[at(mesh.regions[at(k)])]) displacement.normal_mm(k) = displacement.weight(k) = 0;
+  }
+}
+
+class Fitter {
+ public:
+  Fitter(const Image<float>& image, const FitOptions& options, const Progress& progress)
+      : field_(image), options_(options), progress_(progress) {}
+
+  Result<FittedModel> run(const Model& model) {
+    FittedModel fitted{model, {}};
+    if (const auto apart = check_frames(model.network)) return fail(*apart);
+    if (options_.capture && !model.tree.branches.empty()) {
+      if (auto captured = capture(fitted); !captured) return fail(captured.error());
+    }
+    SurfaceNetwork& network = fitted.model.network;
+    network = with_finer_bodies(network, options_.body_spans);
+    for (int round = 0; round < options_.rounds; ++round) {
+      if (auto moved = refine(network, fitted.report); !moved) return fail(moved.error());
+    }
+    fitted.report.control_points = static_cast<int>(network.control_points_mm.cols());
+    return fitted;
+  }
+
+ private:
+  std::optional<Error> check_frames(const SurfaceNetwork& network) const {
+    const Points3& p = network.control_points_mm;
+    Eigen::Index covered = 0;
+    for (Eigen::Index c = 0; c < p.cols(); ++c) covered += field_.covers(p.col(c)) ? 1 : 0;
+    const double share = static_cast<double>(covered) / static_cast<double>(p.cols());
+    if (share >= kLeastCovered) return {};
+    const ImageGrid& grid = field_.image().grid;
+    const Vec3 center = p.rowwise().mean();
+    const Vec3 middle = grid.world_mm(
+        Vec3((grid.size[0] - 1) / 2.0, (grid.size[1] - 1) / 2.0, (grid.size[2] - 1) / 2.0));
+    return Error{
+        ErrorKind::kBadInput, "the model lies outside the image", "fit",
+        fmt::format("{:.0f} % of its control points are inside; the model is centred at "
+                    "({:.4g}, {:.4g}, {:.4g}), the image at ({:.4g}, {:.4g}, {:.4g})",
+                    100 * share, center(0), center(1), center(2), middle(0), middle(1), middle(2)),
+        "both in one frame (LPS, mm), with half of the model inside the image"};
+  }
+
+  // Moves the tree to the image and seeds the model anew; keeps what a reader should know of both.
+  Result<void> capture(FittedModel& fitted) {
+    const auto captured = capture_tree(fitted.model.tree, field_, progress_);
+    if (!captured) return fail(captured.error());
+    fitted.report.mean_axis_move_mm = captured->mean_move_mm;
+    fitted.report.recaptured = captured->recaptured;
+    for (const std::string& name : captured->left_alone) {
+      fitted.report.without_edge.push_back("wall_" + name);
+    }
+    auto seeded = seed_model(captured->tree, options_.seed, progress_);
+    if (!seeded) return fail(seeded.error());
+    seeded->name = fitted.model.name;
+    seeded->assumptions = fitted.model.assumptions;
+    for (const std::string& warning : fitted.model.warnings) {
+      if (std::find(seeded->warnings.begin(), seeded->warnings.end(), warning) ==
+          seeded->warnings.end()) {
+        seeded->warnings.push_back(warning);
+      }
+    }
+    fitted.model = std::move(*seeded);
+    return {};
+  }
+
+  Result<void> refine(SurfaceNetwork& network, FitReport& report) {
+    FitMeshOptions spacing;
+    spacing.voxel_mm = field_.voxel_mm();
+    auto mesh = make_fit_mesh(network, spacing, progress_);
+    if (!mesh) return fail(mesh.error());
+    MeshSmoother smoother(*mesh);
+    Displacement displacement =
+        wall_displacement(field_, *mesh, smoother, options_.displacement, progress_);
+    if (progress_.should_stop()) return fail(cancelled("wall"));
+    report.contrast = displacement.greys.contrast;
+    report.noise = displacement.greys.noise;
+    report.snr = displacement.greys.snr();
+    report.nodes = mesh->size();
+    report.degrees_of_freedom = displacement.degrees_of_freedom;
+    report.wave_factor = displacement.wave_factor;
+    if (!(report.contrast > 0)) {
+      return fail({ErrorKind::kBadInput, "the vessel is not brighter than its background", "fit",
+                   fmt::format("{:.4g}", report.contrast),
+                   "grey inside minus grey outside the model's wall must be positive; dark vessels "
+                   "need --dark"});
+    }
+    std::vector<char> hold(network.regions.size(), 0);
+    for (std::size_t r = 0; r < displacement.evidence.size(); ++r) {
+      hold[r] = displacement.evidence[r] < kEvidence;
+      const std::string& name = network.regions[r].name;
+      auto& without = report.without_edge;
+      const bool listed = std::find(without.begin(), without.end(), name) != without.end();
+      hold[r] = hold[r] || listed;
+      if (hold[r] && !listed) without.push_back(name);
+    }
+    hold_regions(*mesh, hold, displacement);
+    auto moved = move_network(network, *mesh, displacement.normal_mm, progress_);
+    if (!moved) return fail(moved.error());
+    network = std::move(moved->network);
+    report.held = std::move(moved->held);
+    const Eigen::VectorXd& mass = smoother.mass_mm2();
+    report.mean_move_mm = mass.dot(displacement.normal_mm.cwiseAbs()) / mass.sum();
+    return {};
+  }
+
+  GreyField field_;
+  const FitOptions& options_;
+  const Progress& progress_;
+};
+
+}  // namespace
+
+Result<Image<float>> grey_image(const AnyImage& image, const std::string& file) {
+  const ImageGrid& grid = grid_of(image);
+  for (const int n : grid.size) {
+    if (n < 4) {
+      return fail({ErrorKind::kBadInput, "the image is too small", file,
+                   fmt::format("{} x {} x {} voxels", grid.size[0], grid.size[1], grid.size[2]),
+                   "at least 4 voxels along each axis"});
+    }
+  }
+  Image<float> grey(grid);
+  float least = std::numeric_limits<float>::infinity(), most = -least;
+  std::visit(
+      [&](const auto& typed) {
+        for (std::size_t i = 0; i < grey.voxels.size(); ++i) {
+          grey.voxels[i] = static_cast<float>(typed.voxels[i]);
+        }
+      },
+      image);
+  for (std::size_t i = 0; i < grey.voxels.size(); ++i) {
+    const float value = grey.voxels[i];
+    if (!std::isfinite(value)) {
+      const Voxel v = grid.voxel(i);
+      return fail({ErrorKind::kBadInput, "voxel is not a number",
+                   fmt::format("{}, voxel ({}, {}, {})", file, v[0], v[1], v[2]),
+                   fmt::format("{}", value), "grey values are finite"});
+    }
+    least = std::min(least, value);
+    most = std::max(most, value);
+  }
+  if (!(most > least)) {
+    return fail({ErrorKind::kBadInput, "the image is constant", file, fmt::format("{}", least),
+                 "vessels differ from their background"});
+  }
+  return grey;
+}
+
+Result<FittedModel> fit_model(const Model& model, const Image<float>& image,
+                              const FitOptions& options, const Progress& progress) {
+  if (model.network.patches.empty()) {
+    return fail({ErrorKind::kBadInput, "the model has no surfaces", model.name, {}, {}});
+  }
+  return Fitter(image, options, progress).run(model);
+}
+
+}  // namespace angiospline

@@ -1,0 +1,59 @@
+// A model fitted to the image it came from: every wall moved to where the grey values put it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "modeling/model.h"
+#include "modeling/seed_model.h"
+#include "recovery/any_image.h"
+#include "recovery/fit_displacement.h"
+#include "recovery/fit_network.h"
+
+namespace angiospline {
+
+struct FitOptions {
+  bool capture = true;      // move the centerlines and radii to the image and seed anew, first
+  bool dark = false;        // vessels are darker than their background
+  int rounds = 1;           // of free-form refinement of the surface
+  double body_spans = 1.0;  // length of a body's spans, in radii
+  DisplacementOptions displacement;
+  SeedOptions seed;
+};
+
+struct FitReport {
+  double contrast = 0.0;  // grey of the vessel above its background
+  double noise = 0.0;     // standard deviation of a voxel's grey
+  double snr = 0.0;       // contrast over noise, at most 20
+  int nodes = 0;          // of the finite-element mesh
+  int control_points = 0;
+  double wave_factor = 1.0;         // smoothing that the data chose (recovery/fit_displacement.h)
+  double degrees_of_freedom = 0.0;  // of the refinement
+  double mean_axis_move_mm = 0.0;   // of the centerlines in the capture
+  double mean_move_mm = 0.0;        // of the surface, over its area, in the refinement
+  double mean_residual_mm = 0.0;    // what the image still asks for, smoothed as the fit is
+  std::vector<std::string> without_edge;  // regions near which the image shows no wall: as seeded
+  std::vector<std::string> recaptured;  // branches that lay beside their vessel and were led there
+  std::vector<HeldRegion> held;         // regions that would have folded: as seeded
+  std::vector<std::string> warnings;
+};
+
+struct FittedModel {
+  Model model;
+  FitReport report;
+};
+
+// The voxels as floats. Errors, naming `file`: voxels that are NaN or infinite, an image without
+// any contrast, fewer than 4 voxels along an axis.
+Result<Image<float>> grey_image(const AnyImage& image, const std::string& file);
+
+// Fits the whole network, bodies and junctions together (docs/fit.md). Open ends stay open and in
+// their planes; patches keep their common tangent planes. Errors: the model lies outside the
+// image or mostly so (their frames differ); no contrast at the model's wall; stopped on request.
+// Time linear in the wall's area.
+Result<FittedModel> fit_model(const Model& model, const Image<float>& image,
+                              const FitOptions& options = {}, const Progress& progress = {});
+
+}  // namespace angiospline

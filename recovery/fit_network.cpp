@@ -1,0 +1,457 @@
+#include "recovery/fit_network.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+
+#include <Eigen/Dense>
+#include <tbb/parallel_for.h>
+
+#include "kernel/basis.h"
+#include "kernel/curvature.h"
+#include "modeling/penalised_spline.h"
+#include "recovery/fit_junction.h"
+#include "recovery/fit_rings.h"
+
+namespace angiospline {
+namespace {
+
+constexpr int kPerPatch = 5;
+constexpr double kRidge = 1e-7;  // of the mean diagonal: spans without nodes stay as they are
+constexpr double kLeastJacobian = 0.3;  // of a body, relative to what it was
+
+std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
+// A value at a place along a ring: patch number + v.
+struct RingSample {
+  double place = 0.0;
+  Vec3 move = Vec3::Zero();
+  double weight = 1.0;
+};
+
+// Row of the ring's points that do not vanish at `place`: six, cyclically from 5 * patch.
+std::pair<int, Eigen::Matrix<double, 6, 1>> ring_functions(double place, int patches) {
+  static const KnotVector knots = KnotVector::bezier(5);
+  const int patch = std::min(static_cast<int>(place), patches - 1);
+  return {kPerPatch * patch, basis_at(knots, place - patch, 0).values.row(0).transpose().head<6>()};
+}
+
+Eigen::VectorXd ring_row(const StripRing& ring, const Eigen::MatrixXd& basis, double place) {
+  const auto [first, values] = ring_functions(place, static_cast<int>(ring.patches.size()));
+  Eigen::VectorXd row = Eigen::VectorXd::Zero(basis.cols());
+  for (int k = 0; k < 6; ++k) {
+    row += values(k) * basis.row((first + k) % ring.points()).transpose();
+  }
+  return row;
+}
+
+// The moves of a ring's points nearest to the samples.
+Points3 fit_ring(const StripRing& ring, const std::vector<RingSample>& samples) {
+  const Eigen::MatrixXd basis = ring.basis();
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
+  Eigen::MatrixXd b = Eigen::MatrixXd::Zero(basis.cols(), 3);
+  for (const RingSample& s : samples) {
+    const Eigen::VectorXd row = ring_row(ring, basis, s.place);
+    A += s.weight * row * row.transpose();
+    b += s.weight * row * s.move.transpose();
+  }
+  A.diagonal().array() += std::max(1e-300, 1e-5 * A.trace() / static_cast<double>(A.rows()));
+  return (basis * A.ldlt().solve(b)).transpose();
+}
+
+// A body between rows that are given.
+struct BodyFit {
+  Points3 points;  // row by row
+  bool folded = false;
+};
+
+class Mover {
+ public:
+  Mover(const SurfaceNetwork& network, const FitMesh& mesh, const Eigen::VectorXd& displacement)
+      : old_(network),
+        mesh_(mesh),
+        displacement_(displacement),
+        normals_(moved_normals(mesh, displacement)),
+        mass_(MeshSmoother(mesh).mass_mm2()),
+        rings_(strip_rings(network)),
+        ring_of_(network.patches.size(), -1),
+        nodes_of_(network.patches.size()) {
+    for (std::size_t r = 0; r < rings_.size(); ++r) {
+      for (std::size_t k = 0; k < rings_[r].patches.size(); ++k) {
+        ring_of_[at(rings_[r].patches[k])] = static_cast<int>(r);
+      }
+    }
+    for (int k = 0; k < mesh.size(); ++k) nodes_of_[at(mesh.origins[at(k)].patch)].push_back(k);
+  }
+
+  Result<MovedNetwork> run(const Progress& progress) {
+    MovedNetwork result;
+    result.network = old_;
+    Points3& pool = result.network.control_points_mm;
+    const std::map<int, Vec3> openings = moved_openings();
+    move_junctions(openings, result, progress);
+    if (progress.should_stop()) return fail(cancelled("junctions"));
+    move_end_rows(pool);
+    apply_dependencies(result.network);
+    move_bodies(result, progress);
+    if (progress.should_stop()) return fail(cancelled("bodies"));
+    move_rims(result.network);
+    return result;
+  }
+
+ private:
+  bool is_body(const StripRing& ring) const {
+    return old_.regions[at(ring.region)].kind == RegionKind::kBody;
+  }
+  int position_in_ring(int patch) const {
+    const std::vector<int>& patches = rings_[at(ring_of_[at(patch)])].patches;
+    return static_cast<int>(std::find(patches.begin(), patches.end(), patch) - patches.begin());
+  }
+  Vec3 move_of(int node) const { return displacement_(node) * mesh_.nodes[at(node)].normal; }
+
+  // ---- openings
+
+  // Nodes on the openings' circles are nodes of the bodies; joins tell where they lie on the
+  // junctions' rows.
+  std::map<int, Vec3> moved_openings() const {
+    std::map<int, std::vector<RingSample>> samples;
+    for (const Join& join : old_.joins) {
+      for (const bool swap : {false, true}) {
+        const Side& body = swap ? join.b : join.a;
+        const Side& opening = swap ? join.a : join.b;
+        if (opening.side != PatchSide::kU0 || !is_junction_patch(opening.patch) ||
+            is_junction_patch(body.patch)) {
+          continue;
+        }
+        collect(body, opening, join.reversed, samples[ring_of_[at(opening.patch)]]);
+      }
+    }
+    for (const Rim& rim : old_.rims) {
+      for (const Side& side : rim.sides) {
+        if (side.side == PatchSide::kU0 && is_junction_patch(side.patch)) {
+          collect(side, side, false, samples[ring_of_[at(side.patch)]]);
+        }
+      }
+    }
+    std::map<int, Vec3> moved;
+    for (auto& [r, of_ring] : samples) {
+      const StripRing& ring = rings_[at(r)];
+      const Vec3 axis = (old_.control_points_mm.col(ring.columns(0, 0)) -
+                         old_.control_points_mm.col(ring.columns(1, 0)))
+                            .normalized();
+      const Points3 moves = fit_ring(ring, of_ring);
+      for (int c = 0; c < ring.points(); ++c) {
+        const Vec3 move = moves.col(c);
+        moved[ring.columns(0, c)] =
+            old_.control_points_mm.col(ring.columns(0, c)) + move - axis.dot(move) * axis;
+      }
+    }
+    return moved;
+  }
+
+  bool is_junction_patch(int patch) const {
+    return ring_of_[at(patch)] >= 0 &&
+           old_.regions[at(old_.patches[at(patch)].region)].kind == RegionKind::kJunction;
+  }
+
+  void collect(const Side& from, const Side& to, bool reversed,
+               std::vector<RingSample>& samples) const {
+    const Patch& patch = old_.patches[at(from.patch)];
+    const double end = from.side == PatchSide::kU0 ? patch.u.first() : patch.u.last();
+    const int position = position_in_ring(to.patch);
+    for (const int node : nodes_of_[at(from.patch)]) {
+      const Vec2& uv = mesh_.origins[at(node)].uv;
+      if (uv.x() != end || uv.y() < from.from || uv.y() > from.to) continue;
+      const double s = (uv.y() - from.from) / (from.to - from.from);
+      const double t = to.from + (reversed ? 1 - s : s) * (to.to - to.from);
+      samples.push_back({position + t, move_of(node), 1.0});
+    }
+  }
+
+  // ---- junctions
+
+  void move_junctions(const std::map<int, Vec3>& openings, MovedNetwork& result,
+                      const Progress& progress) const {
+    std::map<int, std::vector<StripRing>> junctions;  // by region
+    for (const StripRing& ring : rings_) {
+      if (!is_body(ring)) junctions[ring.region].push_back(ring);
+    }
+    std::vector<int> regions;
+    for (const auto& [region, of_junction] : junctions) regions.push_back(region);
+    std::vector<MovedJunction> moved(regions.size());
+    std::atomic<std::size_t> done{0};
+    tbb::parallel_for(std::size_t{0}, regions.size(), [&](std::size_t k) {
+      if (progress.should_stop()) return;
+      const std::vector<StripRing>& of_junction = junctions.at(regions[k]);
+      moved[k] = move_junction(old_, of_junction, openings, samples_on(of_junction));
+      progress.at("junctions", static_cast<double>(++done) / static_cast<double>(regions.size()));
+    });
+    for (std::size_t k = 0; k < regions.size(); ++k) {
+      if (moved[k].failure.empty()) {
+        for (const auto& [column, point] : moved[k].points) {
+          result.network.control_points_mm.col(column) = point;
+        }
+      } else {
+        result.held.push_back({old_.regions[at(regions[k])].name, moved[k].failure});
+      }
+    }
+  }
+
+  std::vector<JunctionSample> samples_on(const std::vector<StripRing>& rings) const {
+    std::vector<JunctionSample> samples;
+    for (const StripRing& ring : rings) {
+      for (const int patch : ring.patches) {
+        const std::vector<int>& nodes = nodes_of_[at(patch)];
+        double area = 0;
+        for (const int node : nodes) area += mass_(node);
+        for (const int node : nodes) {
+          JunctionSample s;
+          s.patch = patch;
+          s.uv = mesh_.origins[at(node)].uv;
+          s.target_mm = mesh_.nodes[at(node)].point_mm + move_of(node);
+          s.normal = normals_.col(node);
+          s.weight = mass_(node) / area;
+          samples.push_back(s);
+        }
+      }
+    }
+    return samples;
+  }
+
+  // ---- bodies
+
+  // Rims' rows take the ring nearest to their nodes, in their plane.
+  void move_end_rows(Points3& pool) const {
+    for (const Rim& rim : old_.rims) {
+      std::vector<RingSample> samples;
+      int r = -1;
+      PatchSide end = PatchSide::kU0;
+      for (const Side& side : rim.sides) {
+        r = ring_of_[at(side.patch)];
+        end = side.side;
+        if (r < 0 || !is_body(rings_[at(r)])) break;
+        collect(side, side, false, samples);
+      }
+      if (samples.empty() || !is_body(rings_[at(r)])) continue;
+      const StripRing& ring = rings_[at(r)];
+      const int row = end == PatchSide::kU0 ? 0 : ring.rows() - 1;
+      const Points3 moves = fit_ring(ring, samples);
+      for (int c = 0; c < ring.points(); ++c) {
+        const Vec3 move = moves.col(c);
+        pool.col(ring.columns(row, c)) += move - rim.normal.dot(move) * rim.normal;
+      }
+    }
+  }
+
+  // Whether a body's end is a rim: then the next row is free.
+  std::vector<char> free_next_rows(bool at_end) const {
+    std::vector<char> is_free(rings_.size(), 0);
+    for (const Rim& rim : old_.rims) {
+      for (const Side& side : rim.sides) {
+        const bool same = side.side == (at_end ? PatchSide::kU1 : PatchSide::kU0);
+        if (same && ring_of_[at(side.patch)] >= 0) is_free[at(ring_of_[at(side.patch)])] = 1;
+      }
+    }
+    return is_free;
+  }
+
+  void move_bodies(MovedNetwork& result, const Progress& progress) const {
+    const std::vector<char> free_start = free_next_rows(false);
+    const std::vector<char> free_end = free_next_rows(true);
+    std::vector<BodyFit> fits(rings_.size());
+    std::atomic<std::size_t> done{0};
+    tbb::parallel_for(std::size_t{0}, rings_.size(), [&](std::size_t r) {
+      if (!is_body(rings_[r]) || progress.should_stop()) return;
+      fits[r] = fit_body(rings_[r], result.network.control_points_mm, free_start[r] != 0,
+                         free_end[r] != 0);
+      progress.at("bodies", static_cast<double>(++done) / static_cast<double>(rings_.size()));
+    });
+    for (std::size_t r = 0; r < rings_.size(); ++r) {
+      const StripRing& ring = rings_[r];
+      if (!is_body(ring) || fits[r].points.cols() == 0) continue;
+      for (int i = 1; i + 1 < ring.rows(); ++i) {
+        for (int c = 0; c < ring.points(); ++c) {
+          result.network.control_points_mm.col(ring.columns(i, c)) =
+              fits[r].points.col(i * ring.points() + c);
+        }
+      }
+      if (fits[r].folded) {
+        result.held.push_back({old_.regions[at(ring.region)].name, "its wall would fold"});
+      }
+    }
+  }
+
+  BodyFit fit_body(const StripRing& ring, const Points3& pool, bool free_start,
+                   bool free_end) const {
+    // Moves of the rows that are given.
+    const int rows = ring.rows(), n = ring.points();
+    const auto end_move = [&](int row) {
+      Points3 moves(3, n);
+      for (int c = 0; c < n; ++c) {
+        moves.col(c) =
+            pool.col(ring.columns(row, c)) - old_.control_points_mm.col(ring.columns(row, c));
+      }
+      return moves;
+    };
+    const Points3 start = end_move(0), end = end_move(rows - 1);
+    const int first = free_start ? 1 : 2;
+    const int last = free_end ? rows - 2 : rows - 3;
+    Points3 moves = Points3::Zero(3, static_cast<Eigen::Index>(rows) * n);
+    for (int i = 0; i < first; ++i) moves.middleCols(i * n, n) = start;
+    for (int i = last + 1; i < rows; ++i) moves.middleCols(i * n, n) = end;
+    BodyFit fit;
+    if (last >= first) solve_rows(ring, first, last, moves);
+    fit.points = old_net(ring) + moves;
+    if (folded(ring, fit.points)) {
+      // Only the ends move; their moves die out over the rows between.
+      for (int i = first; i <= last; ++i) {
+        const double w = static_cast<double>(i) / (rows - 1);
+        const double fade_start = std::max(0.0, 1 - 3 * w), fade_end = std::max(0.0, 3 * w - 2);
+        moves.middleCols(i * n, n) = fade_start * start + fade_end * end;
+      }
+      fit.points = old_net(ring) + moves;
+      fit.folded = true;
+    }
+    return fit;
+  }
+
+  Points3 old_net(const StripRing& ring) const {
+    Points3 net(3, static_cast<Eigen::Index>(ring.rows()) * ring.points());
+    for (int i = 0; i < ring.rows(); ++i) {
+      for (int c = 0; c < ring.points(); ++c) {
+        net.col(i * ring.points() + c) = old_.control_points_mm.col(ring.columns(i, c));
+      }
+    }
+    return net;
+  }
+
+  // Least squares over rows first .. last, all other rows of `moves` given. Banded: rows of the net
+  // are six apart at most.
+  void solve_rows(const StripRing& ring, int first, int last, Points3& moves) const {
+    const Eigen::MatrixXd basis = ring.basis();
+    const Eigen::Index d = basis.cols();
+    const Eigen::Index size = d * (last - first + 1);
+    SymmetricBand A = SymmetricBand::Zero(std::min(size, 6 * d), size);
+    Eigen::MatrixXd b = Eigen::MatrixXd::Zero(size, 3);
+    for (std::size_t k = 0; k < ring.patches.size(); ++k) {
+      for (const int node : nodes_of_[at(ring.patches[k])]) {
+        const Vec2& uv = mesh_.origins[at(node)].uv;
+        const BasisValues bu = basis_at(ring.u, uv.x(), 0);
+        const auto [c0, bv] =
+            ring_functions(static_cast<double>(k) + uv.y(), static_cast<int>(ring.patches.size()));
+        const Eigen::VectorXd around = ring_row(ring, basis, static_cast<double>(k) + uv.y());
+        Vec3 value = move_of(node);
+        Eigen::VectorXd row = Eigen::VectorXd::Zero(6 * d);
+        Eigen::Index from = -1;
+        int parts = 0;
+        for (int i = 0; i < 6; ++i) {
+          const int r = bu.first + i;
+          const double w = bu.values(0, i);
+          if (r >= first && r <= last) {
+            if (from < 0) from = d * (r - first);
+            row.segment(d * parts++, d) = w * around;
+          } else {
+            for (int j = 0; j < 6; ++j) {
+              value -= w * bv(j) * moves.col(r * ring.points() + (c0 + j) % ring.points());
+            }
+          }
+        }
+        if (from < 0) continue;
+        const Eigen::Index count = d * parts;
+        for (Eigen::Index x = 0; x < count; ++x) {
+          const double wx = mass_(node) * row(x);
+          if (wx == 0) continue;
+          for (Eigen::Index y = x; y < count; ++y) A(y - x, from + x) += wx * row(y);
+          b.row(from + x) += wx * value.transpose();
+        }
+      }
+    }
+    A.row(0).array() += kRidge * A.row(0).mean() + 1e-300;
+    if (!factorise_band(A)) return;
+    solve_band(A, b);
+    for (int i = first; i <= last; ++i) {
+      moves.middleCols(i * ring.points(), ring.points()) =
+          (basis * b.middleRows(d * (i - first), d)).transpose();
+    }
+  }
+
+  // Whether the least Su x Sv against the old normal, over its mean, falls too far.
+  bool folded(const StripRing& ring, const Points3& net) const {
+    double before = 1, after = 1, sum_before = 0, sum_after = 0;
+    std::vector<std::pair<double, double>> areas;
+    const int n = ring.points();
+    for (std::size_t k = 0; k < ring.patches.size(); ++k) {
+      Points3 control(3, static_cast<Eigen::Index>(ring.rows()) * 6);
+      for (int i = 0; i < ring.rows(); ++i) {
+        for (int j = 0; j < 6; ++j) {
+          control.col(i * 6 + j) = net.col(i * n + (kPerPatch * static_cast<int>(k) + j) % n);
+        }
+      }
+      const BSplineSurface<3> old = patch_surface(old_, ring.patches[k]);
+      const BSplineSurface<3> moved(ring.u, old.v(), control);
+      const std::vector<double> breaks = ring.u.breakpoints();
+      for (std::size_t s = 0; s + 1 < breaks.size(); ++s) {
+        for (const double t : {0.0, 0.5}) {
+          const double u = breaks[s] + t * (breaks[s + 1] - breaks[s]);
+          for (const double v : {0.0, 0.25, 0.5, 0.75}) {
+            const Vec3 normal = normal_vector(old, u, v);
+            areas.emplace_back(normal.norm(), normal_vector(moved, u, v).dot(normal.normalized()));
+            sum_before += areas.back().first;
+            sum_after += areas.back().second;
+          }
+        }
+      }
+    }
+    if (!(sum_after > 0)) return true;
+    const double count = static_cast<double>(areas.size());
+    for (const auto& [one, other] : areas) {
+      before = std::min(before, one * count / sum_before);
+      after = std::min(after, other * count / sum_after);
+    }
+    return after < kLeastJacobian * before;
+  }
+
+  // ---- rims
+
+  void move_rims(SurfaceNetwork& network) const {
+    for (Rim& rim : network.rims) {
+      Vec3 center = Vec3::Zero();
+      double count = 0;
+      std::vector<Vec3> points;
+      for (const Side& side : rim.sides) {
+        const BSplineSurface<3> surface = patch_surface(network, side.patch);
+        for (int k = 0; k < 8; ++k) {
+          const Vec2 uv = side_parameters(network.patches[at(side.patch)], side.side,
+                                          side.from + (side.to - side.from) * k / 8);
+          points.push_back(surface.at(uv.x(), uv.y()));
+          center += points.back();
+          count += 1;
+        }
+      }
+      center /= count;
+      rim.center_mm = center - rim.normal.dot(center - rim.center_mm) * rim.normal;
+      double radius = 0;
+      for (const Vec3& p : points) radius += (p - rim.center_mm).norm() / count;
+      rim.radius_mm = radius;
+    }
+  }
+
+  const SurfaceNetwork& old_;
+  const FitMesh& mesh_;
+  const Eigen::VectorXd& displacement_;
+  Points3 normals_;
+  Eigen::VectorXd mass_;
+  std::vector<StripRing> rings_;
+  std::vector<int> ring_of_;                // of each patch, or -1
+  std::vector<std::vector<int>> nodes_of_;  // nodes whose origin is in each patch
+};
+
+}  // namespace
+
+Result<MovedNetwork> move_network(const SurfaceNetwork& network, const FitMesh& mesh,
+                                  const Eigen::VectorXd& displacement, const Progress& progress) {
+  return Mover(network, mesh, displacement).run(progress);
+}
+
+}  // namespace angiospline

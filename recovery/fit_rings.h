@@ -1,0 +1,39 @@
+// The patches around one opening or one body as rings of control points.
+#pragma once
+
+#include <vector>
+
+#include "base/result.h"
+#include "modeling/surface_network.h"
+
+namespace angiospline {
+
+// Patches side by side that close on themselves: kV1 of each meets kV0 of the next. Row i of the
+// ring is control row i (along u) of all of them, five points a patch, cyclically. In a body rows
+// go from end to end; in a junction, from the opening of one branch to its saddles.
+struct StripRing {
+  int region = -1;
+  std::vector<int> patches;
+  KnotVector u = KnotVector::bezier(5);
+  Eigen::MatrixXi columns;  // of the pool: one row a control row, five columns a patch
+  // Where patch k - 1 meets patch k, the derivative on the far side is so many times that on the
+  // near side: in every row of a body, in the first row of a junction's ring.
+  std::vector<double> seam_ratios;
+
+  int rows() const { return static_cast<int>(columns.rows()); }
+  int points() const { return static_cast<int>(columns.cols()); }
+
+  // Weights (points() rows) of 4 numbers a patch that make every ring with these seams: the seam
+  // point, its derivative, and the two points between.
+  Eigen::MatrixXd basis() const;
+};
+
+// All rings of the network, in the order of their first patches. Patches that are not quintic and
+// Bezier in v, or do not close into a ring, are in none.
+std::vector<StripRing> strip_rings(const SurfaceNetwork& network);
+
+// The same surfaces with knots added to the bodies by bisection until no span is longer than
+// `radii` of its ring (mean distance from its centre). Pool columns are numbered anew.
+SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii);
+
+}  // namespace angiospline
