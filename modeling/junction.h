@@ -67,4 +67,9 @@ Result<std::vector<double>> opening_distances_mm(const JunctionSpec& spec,
 Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options = {},
                                const Progress& progress = {});
 
+// The junction before its legs are smooth, ungated: a surface like the thesis's template (3.3.2),
+// with its saddles and openings tangent-plane continuous and the 2 n boundaries from the openings
+// to the poles rough. For experiments; errors: those of opening_distances_mm.
+Result<Junction> make_rough_junction(const JunctionSpec& spec, const JunctionOptions& options = {});
+
 }  // namespace angiospline

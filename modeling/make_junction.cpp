@@ -53,7 +53,8 @@ bool is_better(const JunctionQuality& a, const JunctionQuality& b) {
   return a.curvature_times_radius < b.curvature_times_radius;
 }
 
-Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
+Attempt attempt(const OpeningPlan& plan, const Setting& setting,
+                const SmoothingWeights& weights = {}) {
   std::vector<Vec3> directions;
   for (const TargetBranch& b : plan.branches) directions.push_back(b.direction);
   JunctionTopology topology =
@@ -65,7 +66,7 @@ Attempt attempt(const OpeningPlan& plan, const Setting& setting) {
   layout_options.follow = setting.follow;
   layout_options.coarse_sweeps = setting.sweeps;
   const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
-  SmoothedNet smooth = smooth_junction(topology, target, layout);
+  SmoothedNet smooth = smooth_junction(topology, target, layout, weights);
   const JunctionQuality quality = junction_quality(topology, target, smooth.net);
   const double moved = surface_move(topology, smooth.net, smooth.free_points);
   return {std::move(topology), layout, std::move(smooth.net), quality, moved};
@@ -146,6 +147,14 @@ Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& 
   return fail({ErrorKind::kFailed, "no setting gives a smooth junction",
                "junction " + spec.name + " of " + names, why,
                fmt::format("{} settings tried", attempts)});
+}
+
+Result<Junction> make_rough_junction(const JunctionSpec& spec, const JunctionOptions& options) {
+  const Result<OpeningPlan> plan = plan_openings(spec, options);
+  if (!plan) return fail(plan.error());
+  SmoothingWeights weights;
+  weights.degrees.leg = 0;
+  return make_result(spec, *plan, attempt(*plan, kLadder.front(), weights), 1);
 }
 
 }  // namespace angiospline

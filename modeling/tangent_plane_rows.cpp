@@ -109,7 +109,8 @@ SmoothEdges smooth_edges(const JunctionTopology& topology, const JunctionLayout&
     all.rows += edge.row_count();
     all.edges.push_back(edge);
   };
-  for (int p = 0; p < static_cast<int>(topology.patches.size()); ++p) {
+  const int legs = degrees.leg > 0 ? static_cast<int>(topology.patches.size()) : 0;
+  for (int p = 0; p < legs; ++p) {
     const JunctionPatch& patch = topology.patches[at(p)];
     SmoothEdge edge;
     edge.ratio_degree = degrees.leg;

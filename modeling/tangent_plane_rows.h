@@ -44,7 +44,7 @@ struct SmoothEdges {
 };
 
 struct EdgeDegrees {
-  int leg = 2;
+  int leg = 2;  // 0: legs stay as they are
   int saddle = 1;
 };
 
