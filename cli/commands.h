@@ -110,6 +110,13 @@ struct PhantomArguments {
   std::uint64_t random_seed = 1;
 };
 
+struct ReproduceArguments {
+  std::vector<std::string> tables;  // none: all
+  bool quick = false;
+  std::uint64_t random_seed = 1;
+  bool json = false;
+};
+
 int run_recover(const RecoverArguments& arguments);
 int run_seed(const SeedArguments& arguments);
 int run_segment(const SegmentArguments& arguments);
@@ -121,5 +128,6 @@ int run_compare(const CompareArguments& arguments);
 int run_compare_masks(const CompareMasksArguments& arguments);
 int run_convert(const ConvertArguments& arguments);
 int run_phantom(const PhantomArguments& arguments);
+int run_reproduce(const ReproduceArguments& arguments);
 
 }  // namespace angiospline::cli

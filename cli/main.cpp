@@ -88,6 +88,7 @@ struct CommandLine {
   CompareMasksArguments compare_masks;
   ConvertArguments convert;
   PhantomArguments phantom;
+  ReproduceArguments reproduce;
   std::function<int()> verb;
 };
 
@@ -231,6 +232,18 @@ void add_phantom(CLI::App& app, CommandLine& line) {
   command->callback([&line] { line.verb = [&line] { return run_phantom(line.phantom); }; });
 }
 
+void add_reproduce(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "reproduce", "the thesis's experiments on phantoms, its figures beside ours");
+  ReproduceArguments& a = line.reproduce;
+  command->add_option("TABLE", a.tables,
+                      "7.1 7.2 7.3 7.4 7.5 cylinder potato 7.6 vessel bifurcation (default: all)");
+  command->add_flag("--quick", a.quick, "a few rows and iterations only, to see that it runs");
+  command->add_option("--random-seed", a.random_seed, "of the noise");
+  add_json_flag(command, a.json);
+  command->callback([&line] { line.verb = [&line] { return run_reproduce(line.reproduce); }; });
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Angiospline: vessels to CAD, from an image or from centerlines with radii"};
   app.name("angiospline");
@@ -238,8 +251,9 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.option_defaults()->always_capture_default();
   CommandLine line;
-  for (const auto add : {add_recover, add_seed, add_segment, add_thin, add_graph, add_smooth,
-                         add_check, add_compare, add_compare_masks, add_convert, add_phantom}) {
+  for (const auto add :
+       {add_recover, add_seed, add_segment, add_thin, add_graph, add_smooth, add_check, add_compare,
+        add_compare_masks, add_convert, add_phantom, add_reproduce}) {
     add(app, line);
   }
   try {

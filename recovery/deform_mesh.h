@@ -55,15 +55,17 @@ enum class Caps { kOpen, kFans };
 TriangleMesh triangles_of(const DeformMesh& mesh, Caps caps);
 
 struct NetworkMeshOptions {
-  double tolerance_mm = 0.0;  // of the control mesh from the surface; 0: only least_pieces counts
-  int least_pieces = 1;       // that each knot span is cut into, at least
+  // Each is a reason to cut; 0 (1) is none.
+  double tolerance_mm = 0.0;     // bound on the distance of the control mesh from the surface
+  double longest_side_mm = 0.0;  // of the control mesh
+  int least_pieces = 1;          // of each knot span
   int most_nodes = 1000000;
 };
 
 // The same surfaces over knots so fine that the control mesh stands for them: each span is cut into
 // equal pieces, as many as refine_to_tolerance wants on any patch that shares its boundaries, so
 // that patches still meet control point by control point. Pool columns are the mesh's nodes.
-// Errors: tolerance negative or neither figure given; a join of parts of sides (names the patches);
+// Errors: a figure that is negative or not finite; a join of parts of sides (names the patches);
 // more nodes than allowed; those of refine_to_tolerance.
 struct RefinedNetwork {
   SurfaceNetwork network;

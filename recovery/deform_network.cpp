@@ -121,6 +121,9 @@ Result<void> check(const SurfaceNetwork& network, const NetworkMeshOptions& opti
   if (!(options.tolerance_mm >= 0) || !std::isfinite(options.tolerance_mm))
     return bad("tolerance of the mesh is not usable", "mesh",
                fmt::format("{}", options.tolerance_mm), "in mm, at least 0");
+  if (!(options.longest_side_mm >= 0) || !std::isfinite(options.longest_side_mm))
+    return bad("longest side of the mesh is not usable", "mesh",
+               fmt::format("{}", options.longest_side_mm), "in mm, at least 0");
   if (options.least_pieces < 1)
     return bad("least number of pieces is not usable", "mesh",
                fmt::format("{}", options.least_pieces), "at least 1");
@@ -196,6 +199,36 @@ std::vector<int> shared_numbers(const SurfaceNetwork& fine, const std::vector<st
   return number;
 }
 
+// Cuts the spans of directions whose control mesh has sides longer than `longest` into more pieces,
+// as many as it takes if sides shrink alike. Returns whether there were any.
+bool shorten(std::vector<Pieces>& pieces, const SurfaceNetwork& fine, const Directions& directions,
+             double longest_mm) {
+  std::vector<double> side(pieces.size(), 0.0);
+  for (std::size_t p = 0; p < fine.patches.size(); ++p) {
+    const auto net = patch_surface(fine, static_cast<int>(p));
+    const auto raise_to = [&](std::size_t direction, double length) {
+      double& most = side[directions.find(direction).of];
+      most = std::max(most, length);
+    };
+    for (int i = 0; i < net.u_count(); ++i)
+      for (int j = 0; j < net.v_count(); ++j) {
+        const Vec3 at = net.control_point(i, j);
+        if (i > 0) raise_to(2 * p, (at - net.control_point(i - 1, j)).norm());
+        if (j > 0) raise_to(2 * p + 1, (at - net.control_point(i, j - 1)).norm());
+      }
+  }
+  bool any = false;
+  for (std::size_t d = 0; d < pieces.size(); ++d) {
+    if (side[d] <= longest_mm) continue;
+    any = true;
+    for (int& k : pieces[d]) {
+      const double more = std::min(side[d] / longest_mm, 2.0);
+      k = std::max(k + 1, static_cast<int>(k * more));
+    }
+  }
+  return any;
+}
+
 // Every direction cut into its class's pieces, and what patches share made one.
 Result<RefinedNetwork> cut_network(const SurfaceNetwork& network, const Directions& directions,
                                    const std::vector<Pieces>& pieces,
@@ -243,12 +276,18 @@ Result<RefinedNetwork> refine_network(const SurfaceNetwork& network,
   // refine_to_tolerance cuts where the bound is large; equal pieces of the same number can miss the
   // tolerance by a little, and then aim lower.
   NetworkMeshOptions aim = options;
+  auto wanted = wanted_pieces(network, directions, aim);
   for (;;) {
-    const auto wanted = wanted_pieces(network, directions, aim);
     if (!wanted) return fail(wanted.error());
     auto out = cut_network(network, directions, *wanted, options);
-    if (!out || options.tolerance_mm == 0 || out->distance_mm <= options.tolerance_mm) return out;
-    aim.tolerance_mm *= 0.9 * options.tolerance_mm / out->distance_mm;
+    if (!out) return out;
+    if (options.tolerance_mm > 0 && out->distance_mm > options.tolerance_mm) {
+      aim.tolerance_mm *= 0.9 * options.tolerance_mm / out->distance_mm;
+      wanted = wanted_pieces(network, directions, aim);
+    } else if (options.longest_side_mm == 0 ||
+               !shorten(*wanted, out->network, directions, options.longest_side_mm)) {
+      return out;
+    }
   }
 }
 

@@ -34,8 +34,8 @@ bool has_mass(DeformMethod method);
 struct DeformOptions {
   DeformMethod method = DeformMethod::kSparse;
   SystemForm form = SystemForm::kElements;
-  ElementOptions elements{0.0, 1.0, 1.0, 0.0, 1.0, 1.0};
-  PotentialOptions potential{PotentialKind::kGravity, 10.0, 4.0, 1.0, {}, 60.0, true};
+  ElementOptions elements{0.0, 0.3, 0.1, 0.0, 1.0, 1.0};
+  PotentialOptions potential{PotentialKind::kGravity, 10.0, 4.0, 1.0, {}, 90.0, true};
   double time_step = 1.0;
   int most_iterations = 2000;
   // At rest: over the last and over the last but one `window` iterations the mean place of no node

@@ -1,0 +1,136 @@
+// Deformation: the 12 surfaces of a bifurcation by the factorised solver beside the thesis's
+// pseudo-inverse, and the cost of an iteration on ever larger meshes.
+//   bench_deformation bifurcation        388 nodes or nearly; preparation and iterations apart
+//   bench_deformation linear [most 1000000]
+// CPU seconds of one thread.
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <numbers>
+#include <string>
+
+#include <Eigen/SVD>
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include "modeling/seed_model.h"
+#include "recovery/deform_solver.h"
+#include "recovery/phantom.h"
+
+namespace {
+
+using namespace angiospline;
+
+double cpu_seconds() {
+  std::timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// Seconds of `work`, and what it returned.
+template <typename Work>
+auto timed(double& seconds, Work&& work) {
+  const double start = cpu_seconds();
+  auto result = work();
+  seconds = cpu_seconds() - start;
+  return result;
+}
+
+void bifurcation() {
+  const auto phantom = make_phantom(PhantomKind::kBifurcation);
+  const auto model = seed_model(phantom->tree);
+  NetworkMeshOptions fineness;
+  fineness.least_pieces = 2;
+  DeformMesh mesh = control_mesh(refine_network(model->network, fineness)->network);
+  mesh.nodes_mm.colwise() += Vec3(1, 0.6, 0);
+  const EdgePoints edges =
+      edge_points(*find_edges(phantom->image, {EdgePercentile{97}}), phantom->image.grid);
+  fmt::print("{} patches, {} nodes, {} edges\n", model->network.patches.size(), mesh.node_count(),
+             edges.count());
+
+  // The thesis inverts the assembled matrix of all coordinates; here they share one n x n.
+  double seconds = 0;
+  const ElementSystem system(mesh, 1, {});
+  timed(seconds, [&] { return divide_by_svd(system.laplacian()); });
+  fmt::print("pseudo-inverse, n x n          {:8.3f} s\n", seconds);
+  const Eigen::Index n = 3 * mesh.node_count();
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(n, n);
+  const Eigen::MatrixXd one(system.laplacian());
+  for (Eigen::Index i = 0; i < one.rows(); ++i)
+    for (Eigen::Index j = 0; j < one.cols(); ++j)
+      for (int k = 0; k < 3; ++k) all(3 * i + k, 3 * j + k) = one(i, j);
+  timed(seconds, [&] {
+    return Eigen::BDCSVD<Eigen::MatrixXd>(all, Eigen::ComputeThinU | Eigen::ComputeThinV)
+        .singularValues()
+        .eval();
+  });
+  fmt::print("pseudo-inverse, 3n x 3n        {:8.3f} s\n", seconds);
+  for (const DeformMethod method : {DeformMethod::kSparse, DeformMethod::kEulerSvd}) {
+    DeformOptions options =
+        method == DeformMethod::kSparse ? DeformOptions{} : thesis_options(method);
+    if (method == DeformMethod::kEulerSvd) options.time_step = 0.005;
+    const auto fit = timed(seconds, [&] { return deform(mesh, edges, 1, options); });
+    fmt::print("{:10} to the end           {:8.3f} s, {} iterations, {}\n", to_string(method),
+               seconds, fit->report.iterations, to_string(fit->report.termination));
+  }
+}
+
+// A tube of `count` nodes and a shell of edges about two voxels from it, one an element.
+void linear(double most) {
+  fmt::print(
+      "   nodes   prepare s   iteration ms   per node us (sparse) | RK1 iteration ms   per node "
+      "us\n");
+  for (double count = 1000; count <= most * 1.01; count *= 10) {
+    const int columns = static_cast<int>(std::sqrt(count / 4)), rows = 4 * columns;
+    const double radius = columns / (2 * std::numbers::pi);
+    DeformMesh mesh;
+    mesh.nodes_mm.resize(3, static_cast<Eigen::Index>(rows) * columns);
+    mesh.springs.resize(2, static_cast<Eigen::Index>(2 * rows - 1) * columns);
+    EdgePoints edges;
+    edges.at_mm.resize(3, mesh.nodes_mm.cols());
+    edges.normals.resize(3, mesh.nodes_mm.cols());
+    edges.strength = Eigen::VectorXd::Ones(mesh.nodes_mm.cols());
+    const auto node = [&](int r, int c) { return r * columns + (c + columns) % columns; };
+    Eigen::Index spring = 0;
+    for (int r = 0; r < rows; ++r)
+      for (int c = 0; c < columns; ++c) {
+        const double a = 2 * std::numbers::pi * c / columns;
+        const Vec3 out(std::cos(a), std::sin(a), 0);
+        const int k = node(r, c);
+        mesh.nodes_mm.col(k) = radius * out + Vec3(0, 0, r);
+        edges.at_mm.col(k) = (radius + 2 + 0.3 * std::sin(7 * a)) * out + Vec3(0, 0, r + 0.2);
+        edges.normals.col(k) = -out;
+        const int side = node(r, c + 1);
+        mesh.springs.col(spring++) << std::min(k, side), std::max(k, side);
+        if (r + 1 == rows) continue;
+        mesh.springs.col(spring++) << k, node(r + 1, c);
+        mesh.faces.push_back({k, side, node(r + 1, c + 1), node(r + 1, c)});
+      }
+    fmt::print("{:8}", mesh.node_count());
+    for (const DeformMethod method : {DeformMethod::kSparse, DeformMethod::kRungeKutta1}) {
+      DeformOptions options =
+          method == DeformMethod::kSparse ? DeformOptions{} : thesis_options(method);
+      options.rest_speed = 1e-12;
+      double one = 0, many = 0;
+      constexpr int kMore = 10;
+      options.most_iterations = 1;
+      if (!timed(one, [&] { return deform(mesh, edges, 1, options); })) return;
+      options.most_iterations = 1 + kMore;
+      if (!timed(many, [&] { return deform(mesh, edges, 1, options); })) return;
+      const double iteration = (many - one) / kMore;
+      if (method == DeformMethod::kSparse) fmt::print("   {:9.3f}", one - iteration);
+      fmt::print("   {:12.2f}   {:11.3f}  ", 1e3 * iteration, 1e6 * iteration / mesh.node_count());
+    }
+    fmt::print("\n");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string what = argc > 1 ? argv[1] : "bifurcation";
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+  if (what == "bifurcation") bifurcation();
+  if (what == "linear") linear(argc > 2 ? std::atof(argv[2]) : 1e6);
+  return 0;
+}

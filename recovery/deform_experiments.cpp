@@ -1,0 +1,146 @@
+#include "recovery/deform_experiments.h"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include "recovery/deform_experiments_tables.h"
+#include "recovery/phantom.h"
+#include "recovery/region_growing.h"
+
+namespace angiospline {
+namespace experiments {
+
+DeformOptions steady(DeformMethod method, const DeformMesh& mesh, PotentialKind kind,
+                     double strength, double reach_vox) {
+  if (method == DeformMethod::kSparse) {
+    DeformOptions o;
+    o.potential.kind = kind;
+    o.potential.strength = strength;
+    o.potential.reach_vox = reach_vox;
+    return o;
+  }
+  DeformOptions o = thesis_options(method);
+  o.potential.kind = kind;
+  o.potential.strength = strength;
+  o.potential.reach_vox = reach_vox;
+  if (has_mass(method)) return o;
+  const ElementSystem system(mesh, 1.0, o.elements);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(system.laplacian()),
+                                                             Eigen::EigenvaluesOnly);
+  const double least = eigen.eigenvalues()[1];  // [0] is the translation's, 0
+  const double steepness = kind == PotentialKind::kGravity ? strength / 2 : strength / reach_vox;
+  o.time_step = std::min(0.4, 1.85 * least / steepness);
+  return o;
+}
+
+std::string listed(const std::vector<double>& values, int digits) {
+  std::string text;
+  for (const double v : values)
+    text += fmt::format("{}{:.{}f}", text.empty() ? "" : ", ", v, digits);
+  return text;
+}
+
+Result<ReproducedTable> region_growing(const ReproduceOptions& options, const Progress& progress) {
+  PhantomOptions image;
+  image.snr = 20;
+  image.loss_deg = 12;
+  image.seed = options.seed;
+  const auto phantom = make_phantom(PhantomKind::kRings, image);
+  if (!phantom) return fail(phantom.error());
+  struct Case {
+    int N;
+    double M, thesis;
+  };
+  std::vector<Case> cases = {{5, 2, 1101}, {5, 3, 1120},  {5, 4, 5916},  {7, 2, 1081},
+                             {7, 3, 2050}, {7, 4, 10172}, {9, 2, 1084},  {9, 3, 1115},
+                             {9, 4, 1129}, {11, 2, 965},  {11, 3, 1114}, {11, 4, 1131}};
+  if (options.quick) cases.resize(3);
+  ReproducedTable t;
+  t.columns = {"segmented points"};
+  const Vec3 seed = phantom_rings()[0].at(0.39);  // midway between two losses
+  int more_with_m = 0, pairs_m = 0, fewer_with_n = 0, pairs_n = 0;
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    GrowOptions grow;
+    grow.neighbourhood_vox = cases[k].N;
+    grow.deviations = cases[k].M;
+    grow.max_examined = 200000;
+    const auto grown = grow_region(phantom->image, {seed}, grow, progress);
+    if (!grown) return fail(grown.error());
+    const auto points = static_cast<double>(grown->report.voxels);
+    t.rows.push_back(
+        {fmt::format("N {:2} M {}", cases[k].N, cases[k].M), {{cases[k].thesis, points}}});
+    const auto ours = [&](std::size_t i) { return *t.rows[i].figures[0].ours; };
+    if (k % 3 != 0) ++pairs_m, more_with_m += points >= ours(k - 1);
+    if (k >= 3) ++pairs_n, fewer_with_n += points <= 1.02 * ours(k - 3);
+    progress.at("table 7.1", static_cast<double>(k + 1) / static_cast<double>(cases.size()));
+  }
+  t.trends.push_back({"more deviations M segment more points", more_with_m == pairs_m,
+                      fmt::format("{} of {} pairs", more_with_m, pairs_m)});
+  if (pairs_n > 0)
+    t.trends.push_back({"larger neighbourhoods N segment no more points, with one exception",
+                        fewer_with_n + 1 >= pairs_n,
+                        fmt::format("{} of {} pairs", fewer_with_n, pairs_n)});
+  t.notes.push_back(
+      "rings of tube radius 4 mm with 12 degrees of lost signal every 45, SNR 20; one seed");
+  return t;
+}
+
+namespace {
+
+struct Entry {
+  const char* id;
+  const char* title;
+  std::function<Result<ReproducedTable>(const ReproduceOptions&, const Progress&)> make;
+};
+
+const std::vector<Entry>& entries() {
+  static const std::vector<Entry> all = {
+      {"7.1", "region growing: points by neighbourhood N and deviations M", region_growing},
+      {"7.2", "gravity: iterations and missed points by method and strength",
+       methods_and_strengths},
+      {"7.3", "gravity and springs", gravity_and_springs},
+      {"7.4", "precision by start position and start size", starts},
+      {"7.5", "accuracy by the number of sides", fineness},
+      {"cylinder", "right cylinder 64^3, noiseless (7.3.1, 7.3.3)", cylinder},
+      {"potato", "potato 64^3, coarse and refined mesh (7.3.3)", potato},
+      {"7.6", "potato with noise, refined mesh", noise},
+      {"vessel", "small bent vessel 32 x 32 x 48 (7.3.3)", small_vessel},
+      {"bifurcation", "bifurcation of 12 surfaces, 128^3 (7.3.4)", bifurcation}};
+  return all;
+}
+
+}  // namespace
+}  // namespace experiments
+
+const std::vector<std::string>& reproducible_tables() {
+  static const std::vector<std::string> ids = [] {
+    std::vector<std::string> out;
+    for (const auto& e : experiments::entries()) out.emplace_back(e.id);
+    return out;
+  }();
+  return ids;
+}
+
+Result<ReproducedTable> reproduce_table(const std::string& id, const ReproduceOptions& options,
+                                        const Progress& progress) {
+  for (const auto& e : experiments::entries()) {
+    if (id != e.id) continue;
+    const auto start = std::chrono::steady_clock::now();
+    auto table = e.make(options, progress);
+    if (!table) return table;
+    table->id = e.id;
+    table->title = e.title;
+    table->seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return table;
+  }
+  std::string known;
+  for (const std::string& k : reproducible_tables()) known += (known.empty() ? "" : " ") + k;
+  return fail({ErrorKind::kBadInput, "no such table", "reproduce", id, "one of: " + known});
+}
+
+}  // namespace angiospline

@@ -1,0 +1,31 @@
+// The experiments behind reproduce_table, by chapter; nothing else includes this.
+#pragma once
+
+#include "recovery/deform_experiments.h"
+#include "recovery/deform_solver.h"
+
+namespace angiospline::experiments {
+
+Result<ReproducedTable> region_growing(const ReproduceOptions& options, const Progress& progress);
+
+Result<ReproducedTable> methods_and_strengths(const ReproduceOptions&, const Progress&);  // 7.2
+Result<ReproducedTable> gravity_and_springs(const ReproduceOptions&, const Progress&);    // 7.3
+Result<ReproducedTable> starts(const ReproduceOptions&, const Progress&);                 // 7.4
+Result<ReproducedTable> fineness(const ReproduceOptions&, const Progress&);               // 7.5
+
+Result<ReproducedTable> cylinder(const ReproduceOptions&, const Progress&);
+Result<ReproducedTable> potato(const ReproduceOptions&, const Progress&);
+Result<ReproducedTable> noise(const ReproduceOptions&, const Progress&);  // 7.6
+Result<ReproducedTable> small_vessel(const ReproduceOptions&, const Progress&);
+Result<ReproducedTable> bifurcation(const ReproduceOptions&, const Progress&);
+
+// thesis_options, with the time step an explicit step bears: massless methods divide by the
+// damping, whose least eigenvalue l (of those not 0) makes forces of steepness s move a mesh by s /
+// l a unit of time; a step beyond 2 l / s overshoots. O(nodes^3).
+DeformOptions steady(DeformMethod method, const DeformMesh& mesh, PotentialKind kind,
+                     double strength, double reach_vox);
+
+// "12, 15, 18"
+std::string listed(const std::vector<double>& values, int digits = 0);
+
+}  // namespace angiospline::experiments
