@@ -174,7 +174,7 @@ Result<ReproducedTable> cylinder(const ReproduceOptions& how, const Progress& pr
 }
 
 Result<ReproducedTable> potato(const ReproduceOptions& how, const Progress& progress) {
-  const auto volume = Volume::make(PhantomKind::kPotato, {}, 95, how, progress);
+  const auto volume = Volume::make(PhantomKind::kPotato, {}, 97, how, progress);
   if (!volume) return fail(volume.error());
   ReproducedTable t;
   t.columns = kColumns;
@@ -217,7 +217,7 @@ Result<ReproducedTable> noise(const ReproduceOptions& how, const Progress& progr
   for (const Case& c : {Case{"SNR 1", 1.0, 344, 3237, 20.30}, Case{"SNR 2", 2.0, 222, 3212, 20.14},
                         Case{"SNR 4", 4.0, 138, 3267, 20.49}, Case{"SNR 8", 8.0, 166, 3266, 20.48},
                         Case{"binary image", {}, 113, 3347, 20.99}}) {
-    const auto volume = Volume::make(PhantomKind::kPotato, c.snr, 95, how, progress);
+    const auto volume = Volume::make(PhantomKind::kPotato, c.snr, 97, how, progress);
     if (!volume) return fail(volume.error());
     const auto mesh = volume->mesh(potato_axis(), {}, sides_up_to(4.5));
     if (!mesh) return fail(mesh.error());
