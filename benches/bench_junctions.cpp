@@ -1,20 +1,26 @@
-// Sweeps random junctions of every class: success, fairness and seconds, one line a class.
-// Seconds are of CPU time, one thread, template and smoothing and gates.
+// Sweeps random junctions of every class: success, fairness and seconds, one line a class; then how
+// long template and smoothing of one bifurcation take. Seconds are of CPU time, one thread.
 // bench_junctions [COUNT [SEED [CLASS [DUMP_DIRECTORY]]]]
 #include <algorithm>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
+#include <numbers>
 #include <string>
 
 #include "junction_classes.h"
 #include <fmt/core.h>
 
 #include "modeling/junction.h"
+#include "modeling/junction_layout.h"
+#include "modeling/plan_openings.h"
+#include "modeling/smooth_junction.h"
 
 namespace {
 
 using namespace angiospline;
+
+double seconds_now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // Plain text for a plotting script: one patch a block of 36 points, rows along u.
 void dump(const std::string& path, const Junction& junction) {
@@ -27,6 +33,69 @@ void dump(const std::string& path, const Junction& junction) {
   }
 }
 
+void sweep(const JunctionClass& family, int count, std::uint64_t seed,
+           const std::string& directory) {
+  Random random(seed);
+  int ok = 0, fair = 0, first = 0;
+  double angle = 0, jacobian = 1, seconds = 0, distance = 0, moved = 0;
+  std::vector<double> curvature;
+  for (int k = 0; k < count; ++k) {
+    const JunctionSpec spec = family.make(random);
+    const double start = seconds_now();
+    const Result<Junction> junction = make_junction(spec);
+    seconds += seconds_now() - start;
+    if (!junction) {
+      fmt::print(stderr, "{} {}: {}\n", family.name, k, junction.error().message());
+      continue;
+    }
+    ++ok;
+    first += junction->attempts == 1;
+    fair += junction->fair;
+    angle = std::max(angle, junction->worst_angle_deg);
+    jacobian = std::min(jacobian, junction->jacobian_ratio);
+    distance = std::max(distance, junction->distance_over_radius);
+    moved = std::max(moved, junction->moved_over_radius);
+    curvature.push_back(junction->curvature_times_radius);
+    if (!junction->fair) {
+      fmt::print(stderr, "{} {}: not fair: curvature {:.3g}, distance {:.3g}\n", family.name, k,
+                 junction->curvature_times_radius, junction->distance_over_radius);
+    }
+    if (!directory.empty()) dump(fmt::format("{}/{}_{}.txt", directory, family.name, k), *junction);
+  }
+  std::sort(curvature.begin(), curvature.end());
+  fmt::print("{:12} {:5} {:5} {:5} {:6} {:9.1e} {:7.3f} {:8.2f} {:8.2f} {:7.3f} {:6.3f} {:7.3f}\n",
+             family.name, count, ok, fair, first, angle, jacobian,
+             curvature.empty() ? 0 : curvature[curvature.size() / 2],
+             curvature.empty() ? 0 : curvature.back(), distance, moved, seconds / count);
+  std::fflush(stdout);
+}
+
+// Openings, target, topology and layout; and the solve: the first setting's, as make_junction runs
+// them.
+void time_stages(const JunctionClass& family, int count, std::uint64_t seed) {
+  Random random(seed);
+  double layout_seconds = 0, smooth_seconds = 0;
+  for (int k = 0; k < count; ++k) {
+    const JunctionSpec spec = family.make(random);
+    const double start = seconds_now();
+    const auto plan = plan_openings(spec, {});
+    if (!plan) continue;
+    std::vector<Vec3> directions;
+    for (const TargetBranch& b : plan->branches) directions.push_back(b.direction);
+    const JunctionTopology topology = junction_topology(directions, 5 * std::numbers::pi / 180);
+    const JunctionTarget target(plan->branches, plan->blend, plan->rounding);
+    const JunctionLayout layout = relaxed_layout(topology, target, plan->distances);
+    const double middle = seconds_now();
+    const SmoothedNet smooth = smooth_junction(topology, target, layout);
+    smooth_seconds += seconds_now() - middle;
+    layout_seconds += middle - start;
+    if (!smooth.solved) fmt::print(stderr, "{} {}: not solved\n", family.name, k);
+  }
+  fmt::print("{}: template {:.4f} s, smoothing {:.4f} s, together {:.4f} s\n", family.name,
+             layout_seconds / count, smooth_seconds / count,
+             (layout_seconds + smooth_seconds) / count);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -34,37 +103,16 @@ int main(int argc, char** argv) {
   const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
   const std::string only = argc > 3 ? argv[3] : "";
   const std::string directory = argc > 4 ? argv[4] : "";
-  fmt::print("{:12} {:>5} {:>5} {:>5} {:>6} {:>9} {:>7} {:>8} {:>8} {:>7}\n", "class", "count",
-             "ok", "fair", "first", "angle", "jacob", "curv med", "curv max", "s");
+  const auto wanted = [&](const JunctionClass& family) {
+    return only.empty() || only == "all" || family.name == only;
+  };
+  fmt::print("{:12} {:>5} {:>5} {:>5} {:>6} {:>9} {:>7} {:>8} {:>8} {:>7} {:>6} {:>7}\n", "class",
+             "count", "ok", "fair", "first", "angle", "jacob", "curv med", "curv max", "dist",
+             "moved", "s");
   for (const JunctionClass& family : junction_classes()) {
-    if (!only.empty() && only != "all" && family.name != only) continue;
-    Random random(seed);
-    int ok = 0, fair = 0, first = 0;
-    double angle = 0, jacobian = 1, seconds = 0;
-    std::vector<double> curvature;
-    for (int k = 0; k < count; ++k) {
-      const JunctionSpec spec = family.make(random);
-      const std::clock_t start = std::clock();
-      const Result<Junction> junction = make_junction(spec);
-      seconds += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-      if (!junction) {
-        fmt::print(stderr, "{} {}: {}\n", family.name, k, junction.error().message());
-        continue;
-      }
-      ++ok;
-      first += junction->attempts == 1;
-      fair += junction->fair;
-      angle = std::max(angle, junction->worst_angle_deg);
-      jacobian = std::min(jacobian, junction->jacobian_ratio);
-      curvature.push_back(junction->curvature_times_radius);
-      if (!directory.empty())
-        dump(fmt::format("{}/{}_{}.txt", directory, family.name, k), *junction);
-    }
-    std::sort(curvature.begin(), curvature.end());
-    fmt::print("{:12} {:5} {:5} {:5} {:6} {:9.1e} {:7.3f} {:8.2f} {:8.2f} {:7.3f}\n", family.name,
-               count, ok, fair, first, angle, jacobian,
-               curvature.empty() ? 0 : curvature[curvature.size() / 2],
-               curvature.empty() ? 0 : curvature.back(), seconds / count);
-    std::fflush(stdout);
+    if (wanted(family)) sweep(family, count, seed, directory);
+  }
+  for (const JunctionClass& family : junction_classes()) {
+    if (wanted(family)) time_stages(family, std::min(count, 20), seed);
   }
 }

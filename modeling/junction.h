@@ -44,7 +44,7 @@ struct Junction {
   double jacobian_ratio = 0.0;            // least |Su x Sv| over its mean on the same patch
   double curvature_times_radius = 0.0;    // largest curvature times the smallest branch radius
   double distance_over_radius = 0.0;      // from the union of cylinders, over the smallest radius
-  double moved_over_radius = 0.0;         // by making it continuous, along normals, likewise
+  double moved_over_radius = 0.0;  // off the blend of the cylinders it was made for, likewise
   bool fair = true;  // curvature below 20 over, distance below half, the smallest radius
   int attempts = 1;  // settings tried
 };

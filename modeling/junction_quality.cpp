@@ -10,7 +10,7 @@
 #include <fmt/core.h>
 
 #include "kernel/basis.h"
-#include "modeling/triangles_cross.h"
+#include "modeling/triangle_crossing.h"
 
 namespace angiospline {
 namespace {
@@ -87,6 +87,21 @@ double target_curvature(const JunctionTarget& target, const Vec3& x, double step
   return std::abs(H) + std::sqrt(std::max(0.0, H * H - K));
 }
 
+// Whether triangles over the nodes of all patches, which share those on their edges, cross.
+bool meets_itself(const Points3& nodes, const SharedGrid& grid, int patches) {
+  std::vector<std::array<int, 3>> triangles;
+  for (int p = 0; p < patches; ++p) {
+    for (int i = 0; i + 1 < kGrid; ++i) {
+      for (int j = 0; j + 1 < kGrid; ++j) {
+        triangles.push_back({grid.at(p, i, j), grid.at(p, i + 1, j), grid.at(p, i + 1, j + 1)});
+        triangles.push_back({grid.at(p, i, j), grid.at(p, i + 1, j + 1), grid.at(p, i, j + 1)});
+      }
+    }
+  }
+  const std::vector<int> groups(triangles.size(), 0);
+  return !crossing_triangles(nodes, triangles, groups).empty();
+}
+
 double angle_deg(const Vec3& a, const Vec3& b) {
   return kDegrees * std::atan2(a.cross(b).norm(), a.dot(b));
 }
@@ -112,11 +127,11 @@ JunctionQuality measure(const JunctionTopology& topology, const JunctionTarget* 
   JunctionQuality q;
   q.jacobian_ratio = 1;
   bool star_shaped = true;
-  std::vector<Points3> grids;
+  const SharedGrid grid(topology, kGrid);
+  Points3 nodes(3, grid.count());
   for (int p = 0; p < patches; ++p) {
     double least = std::numeric_limits<double>::infinity();
     double sum = 0;
-    Points3 grid(3, kGrid * kGrid);
     for (int i = 0; i < kGrid; ++i) {
       for (int j = 0; j < kGrid; ++j) {
         const Derivatives d = evaluate(P[at(p)], kGridBasis[at(i)], kGridBasis[at(j)]);
@@ -125,12 +140,13 @@ JunctionQuality measure(const JunctionTopology& topology, const JunctionTarget* 
         const Vec3 n = cross / area;
         least = std::min(least, area);
         sum += area;
-        grid.col(i * kGrid + j) = d.s;
+        nodes.col(grid.at(p, i, j)) = d.s;
         q.curvature_times_radius =
             std::max(q.curvature_times_radius, smallest * largest_curvature(d, n));
         if (target != nullptr) {
-          q.normal_off_target_deg =
-              std::max(q.normal_off_target_deg, angle_deg(n, target->foot(d.s).normal));
+          const JunctionTarget::Foot foot = target->foot(d.s);
+          q.normal_off_target_deg = std::max(q.normal_off_target_deg, angle_deg(n, foot.normal));
+          q.off_target = std::max(q.off_target, std::abs(foot.distance) / smallest);
           q.distance_to_union =
               std::max(q.distance_to_union, std::abs(target->union_distance(d.s)) / smallest);
         }
@@ -138,7 +154,6 @@ JunctionQuality measure(const JunctionTopology& topology, const JunctionTarget* 
       }
     }
     q.jacobian_ratio = std::min(q.jacobian_ratio, least / (sum / (kGrid * kGrid)));
-    grids.push_back(std::move(grid));
   }
   const auto normal = [&](int p, int a, int b) {
     const Derivatives d = evaluate(P[at(p)], kEdgeBasis[at(a)], kEdgeBasis[at(b)]);
@@ -159,7 +174,7 @@ JunctionQuality measure(const JunctionTopology& topology, const JunctionTarget* 
     }
   }
   // A closed surface seen from the centre without turning its back meets itself nowhere.
-  if (!star_shaped) q.self_intersecting = grids_cross(grids, kGrid);
+  if (!star_shaped) q.self_intersecting = meets_itself(nodes, grid, patches);
   // Comparisons with NaN are false: make every such figure fail its gate.
   for (double* figure : {&q.worst_angle_deg, &q.normal_off_target_deg, &q.curvature_times_radius}) {
     if (!std::isfinite(*figure)) *figure = 1e300;
@@ -203,26 +218,6 @@ Points3 junction_normals(const JunctionTopology& topology, const JunctionNet& ne
     }
   }
   return normals;
-}
-
-double surface_move(const JunctionTopology& topology, const JunctionNet& net,
-                    const Points3& before) {
-  const auto basis = basis_table(kGrid);
-  const double smallest = *std::min_element(net.scale.begin(), net.scale.end());
-  JunctionNet old = net;
-  old.points = before;
-  double farthest = 0;
-  for (int p = 0; p < static_cast<int>(topology.patches.size()); ++p) {
-    const PatchPoints P = patch_points(net, p);
-    const PatchPoints Q = patch_points(old, p);
-    for (int k = 0; k < kGrid * kGrid; ++k) {
-      const Derivatives d = evaluate(P, basis[at(k / kGrid)], basis[at(k % kGrid)]);
-      const Vec3 n = d.su.cross(d.sv).normalized();
-      const Vec3 was = evaluate(Q, basis[at(k / kGrid)], basis[at(k % kGrid)]).s;
-      farthest = std::max(farthest, std::abs(n.dot(d.s - was)));
-    }
-  }
-  return farthest / smallest;
 }
 
 bool is_sound(const JunctionQuality& q) { return failed_gate(q).empty(); }

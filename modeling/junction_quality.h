@@ -12,7 +12,8 @@ namespace angiospline {
 struct JunctionQuality {
   double worst_angle_deg = 0.0;  // between normals over all inner edges, 33 samples with corners
   double jacobian_ratio = 0.0;   // least |Su x Sv| over its mean on the same patch
-  double normal_off_target_deg = 0.0;   // largest angle to the target's normal
+  double normal_off_target_deg = 0.0;  // largest angle to the target's normal
+  double off_target = 0.0;             // largest distance from the target, over the smallest radius
   double curvature_times_radius = 0.0;  // largest curvature times the smallest radius
   double target_curvature = 0.0;   // the target's at the same places; 0 where the surface's is good
   double distance_to_union = 0.0;  // from the branches' cylinders, over the smallest radius
@@ -36,11 +37,6 @@ bool is_fair(const JunctionQuality& quality);
 
 // Fair and not notably sharper than the target: a further try could hardly be better.
 bool is_faithful(const JunctionQuality& quality);
-
-// The farthest way of the surface along its normals when its control points came from `before`, at
-// the same parameters, over the smallest radius.
-double surface_move(const JunctionTopology& topology, const JunctionNet& net,
-                    const Points3& before);
 
 // The first gate the surface does not pass, with value and limit; empty when it is sound.
 std::string failed_gate(const JunctionQuality& quality);

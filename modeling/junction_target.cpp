@@ -22,6 +22,9 @@ constexpr double kRoundedStart = 0.25;
 constexpr double kAcute = 30 * std::numbers::pi / 180;
 constexpr double kWide = 50 * std::numbers::pi / 180;
 constexpr double kRounder = 0.6;
+// The crotch fills up by log 2 times the width: this leaves it within half a radius of the
+// cylinders.
+constexpr double kWidest = 0.6;
 constexpr std::size_t kMostActive = 24;  // branches of one target
 
 // A number and its gradient in space.
@@ -102,7 +105,8 @@ JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend,
       // Wide pairs have the room for a rounder one.
       const double wide = std::clamp((2 * half - kAcute) / (kWide - kAcute), 0.0, 1.0);
       const double radius = (1 + kRounder * wide) * rounding * r;
-      widths_(i, j) = std::max(blend * r, radius * cosine * cosine / std::sin(half));
+      const double width = std::min(radius * cosine * cosine / std::sin(half), kWidest * r);
+      widths_(i, j) = std::max(blend * r, width);
     }
   }
 }

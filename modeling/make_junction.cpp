@@ -44,7 +44,6 @@ struct Attempt {
   JunctionLayout layout;
   JunctionNet net;
   JunctionQuality quality;
-  double moved;
 };
 
 // Of two sound surfaces.
@@ -68,8 +67,7 @@ Attempt attempt(const OpeningPlan& plan, const Setting& setting,
   const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
   SmoothedNet smooth = smooth_junction(topology, target, layout, weights);
   const JunctionQuality quality = junction_quality(topology, target, smooth.net);
-  const double moved = surface_move(topology, smooth.net, smooth.free_points);
-  return {std::move(topology), layout, std::move(smooth.net), quality, moved};
+  return {std::move(topology), layout, std::move(smooth.net), quality};
 }
 
 SurfaceNetwork make_network(const JunctionSpec& spec, const OpeningPlan& plan,
@@ -114,7 +112,7 @@ Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const At
   junction.jacobian_ratio = best.quality.jacobian_ratio;
   junction.curvature_times_radius = best.quality.curvature_times_radius;
   junction.distance_over_radius = best.quality.distance_to_union;
-  junction.moved_over_radius = best.moved;
+  junction.moved_over_radius = best.quality.off_target;
   junction.fair = is_fair(best.quality);
   junction.attempts = attempts;
   return junction;

@@ -144,7 +144,6 @@ void smooth(const JunctionTopology& topology, const JunctionTarget* target,
   for (int k = 0; k < weights.free_steps; ++k) {
     if (!took(solver.free_step(weights.energy))) return;
   }
-  result.free_points = result.net.points;
   solver.restart_coefficients();
   for (int k = 0; k < weights.most_steps; ++k) {
     const double move = solver.constrained_step(weights.energy);
@@ -165,7 +164,7 @@ void smooth(const JunctionTopology& topology, const JunctionTarget* target,
 
 SmoothedNet smooth_junction(const JunctionTopology& topology, const JunctionTarget& target,
                             const JunctionLayout& layout, const SmoothingWeights& weights) {
-  SmoothedNet result{start_net(topology, layout), {}, 0.0, 0, true};
+  SmoothedNet result{start_net(topology, layout), 0.0, 0, true};
   smooth(topology, &target, layout, weights, result);
   return result;
 }
@@ -175,7 +174,7 @@ SmoothedNet smooth_in_place(const JunctionTopology& topology, const JunctionLayo
   SmoothingWeights weights;
   weights.energy = kInPlaceWeights;
   weights.fit_steps = weights.free_steps = 0;
-  SmoothedNet result{std::move(start), {}, 0.0, 0, true};
+  SmoothedNet result{std::move(start), 0.0, 0, true};
   smooth(topology, nullptr, layout, weights, result);
   return result;
 }

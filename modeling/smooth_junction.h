@@ -24,7 +24,6 @@ struct SmoothingWeights {
 
 struct SmoothedNet {
   JunctionNet net;
-  Points3 free_points;    // of the net, before continuity was asked for
   double residual = 0.0;  // largest left over in the cofactor equations, in local radii
   int steps = 0;
   bool solved = true;  // false: a linear system could not be factored

@@ -128,6 +128,25 @@ TEST(MakeJunction, IsTheSameEveryTime) {
   EXPECT_EQ(a->network.control_points_mm, b->network.control_points_mm);
 }
 
+TEST(MakeJunction, StopsOnRequest) {
+  Progress progress;
+  progress.stop_requested = [] { return true; };
+  const Result<Junction> junction = make_junction(y_spec(), {}, progress);
+  ASSERT_FALSE(junction);
+  EXPECT_EQ(junction.error().kind, ErrorKind::kCancelled);
+}
+
+TEST(MakeJunction, OfOrdinaryBranchesIsGentleAndNearItsCylinders) {
+  const JunctionSpec spec =
+      spec_of({{-1, 0, 0}, {0.8, 0.55, 0.1}, {0.7, -0.7, 0}, {0, 0.2, 1}}, {1.0, 0.8, 0.7, 0.5});
+  const Result<Junction> junction = make_junction(spec);
+  ASSERT_TRUE(junction) << junction.error().message();
+  EXPECT_TRUE(junction->fair);
+  EXPECT_LT(junction->curvature_times_radius, 10);
+  EXPECT_LT(junction->moved_over_radius, 0.15);
+  EXPECT_LT(junction->worst_angle_deg, 1e-6);
+}
+
 TEST(OpeningDistances, AreWhereTheOpeningsCome) {
   const JunctionSpec spec = y_spec();
   const auto distances = opening_distances_mm(spec);
