@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include <Eigen/Cholesky>
 
 #include "base/contract.h"
 
@@ -92,6 +95,49 @@ void BandedCholesky::solve_blocks(double* x, int stride) const {
       for (int c = 0; c < stride; ++c) other[c] -= factor * y[c];
     }
   }
+}
+
+CyclicCholesky::CyclicCholesky(int size, int width)
+    : main_(size >= 2 * width ? size - width + 1 : 0),
+      border_(size - main_),
+      band_(std::max(main_, 1), width),
+      corner_(Eigen::MatrixXd::Zero(border_, border_)),
+      coupling_(Eigen::MatrixXd::Zero(border_, main_)) {}
+
+void CyclicCholesky::add(int i, int j, double value) {
+  if (i < j) std::swap(i, j);
+  if (i < main_) {
+    band_.at(i, j) += value;
+  } else if (j >= main_) {
+    corner_(i - main_, j - main_) += value;
+  } else {
+    coupling_(i - main_, j) += value;
+  }
+}
+
+bool CyclicCholesky::factor() {
+  if (main_ > 0) {
+    if (band_.factor() >= 0) return false;
+    solved_ = coupling_.transpose();
+    band_.solve(solved_);
+    corner_ -= coupling_ * solved_;
+  }
+  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(corner_);
+  return in_place.info() == Eigen::Success;
+}
+
+void CyclicCholesky::solve_blocks(double* x, int stride) const {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::Map<Rows> head(x, main_, stride);
+  Eigen::Map<Rows> tail(x + static_cast<std::ptrdiff_t>(main_) * stride, border_, stride);
+  if (main_ > 0) {
+    band_.solve_blocks(x, stride);
+    tail -= coupling_ * head;
+  }
+  const auto lower = corner_.triangularView<Eigen::Lower>();
+  lower.solveInPlace(tail);
+  lower.transpose().solveInPlace(tail);
+  if (main_ > 0) head -= solved_ * tail;
 }
 
 int solve_totally_positive(const CompactRows& A, Eigen::Ref<Eigen::MatrixXd> b) {

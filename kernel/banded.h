@@ -37,6 +37,32 @@ class BandedCholesky {
   std::vector<double> band_;  // row i: (i, i), (i, i - 1), ...
 };
 
+// A symmetric matrix whose band runs on round the corners, as closed splines make it: entry (i, j)
+// exists where i and j are less than `width` apart on the circle of `size` rows. Its Cholesky
+// factor by blocks: all rows but the last few are banded, those few are a dense border. Linear in
+// size * width^2.
+class CyclicCholesky {
+ public:
+  CyclicCholesky(int size, int width);  // all zero
+
+  // Adds to the entries (i, j) and (j, i), which are one.
+  void add(int i, int j, double value);
+
+  // Factors in place. Whether the matrix is positive definite.
+  bool factor();
+
+  // Overwrites right-hand sides, `size` consecutive blocks of `stride` doubles. Requires factor().
+  void solve_blocks(double* x, int stride) const;
+
+ private:
+  int main_;    // rows before the border
+  int border_;  // rows of it: all where the circle is short
+  BandedCholesky band_;
+  Eigen::MatrixXd corner_;    // border_ x border_, the lower triangle
+  Eigen::MatrixXd coupling_;  // border_ x main_
+  Eigen::MatrixXd solved_;    // main_ x border_: the inverse of the band times coupling_'
+};
+
 // Solves A x = b for a square collocation matrix (totally positive: no pivoting is needed).
 // Returns the first row without a usable pivot, or -1; b is overwritten by x.
 // Reference: de Boor & Pinkus, Backward error analysis for totally positive linear systems,

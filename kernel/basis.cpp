@@ -51,7 +51,43 @@ void fill(const double* U, int degree, double t, int derivatives, double* out) {
   for (int k = p + 1; k <= derivatives; ++k) std::fill_n(out + k * order, order, 0.0);
 }
 
+// The values from the reciprocals of the divisors, in the order in which they are met.
+template <int kFixed>
+void fill_values(const double* U, int degree, double t, const double* reciprocals, double* out) {
+  const int p = kFixed > 0 ? kFixed : degree;
+  out[0] = 1;
+  for (int d = 1; d <= p; ++d) {
+    double carried = 0;
+    for (int j = 0; j < d; ++j) {
+      const double share = out[j] * *reciprocals++;
+      out[j] = carried + share * (U[1 + j] - t);
+      carried = share * (t - U[1 - d + j]);
+    }
+    out[d] = carried;
+  }
+}
+
 }  // namespace
+
+void SpanBasis::values(int span, double t, double* out) {
+  const double* U = knots_.knots().data() + span;
+  const int p = knots_.degree();
+  if (span != span_) {
+    span_ = span;
+    double* next = reciprocals_.data();
+    for (int d = 1; d <= p; ++d) {
+      for (int j = 0; j < d; ++j) *next++ = 1 / (U[1 + j] - U[1 - d + j]);
+    }
+  }
+  switch (p) {
+    case 3:
+      return fill_values<3>(U, p, t, reciprocals_.data(), out);
+    case 5:
+      return fill_values<5>(U, p, t, reciprocals_.data(), out);
+    default:
+      return fill_values<0>(U, p, t, reciprocals_.data(), out);
+  }
+}
 
 void basis_on_span(const KnotVector& knots, int span, double t, int derivatives, double* out) {
   const double* U = knots.knots().data() + span;

@@ -1,6 +1,8 @@
 // B-spline basis functions and their derivatives at one parameter.
 #pragma once
 
+#include <array>
+
 #include <Eigen/Core>
 
 #include "kernel/knot_vector.h"
@@ -26,5 +28,21 @@ BasisValues basis_at(const KnotVector& knots, double t, int derivatives = 0, int
 // The same on a span the caller knows; row d starts at out[d * order]. Requires a span of positive
 // length and room for (derivatives + 1) * order doubles. Fixed-degree code up to degree 7.
 void basis_on_span(const KnotVector& knots, int span, double t, int derivatives, double* out);
+
+// The values alone, at many parameters span by span: what is divided by on a span is divided by
+// once. Agrees with the above to a few ulps.
+class SpanBasis {
+ public:
+  // Keeps a reference to `knots`.
+  explicit SpanBasis(const KnotVector& knots) : knots_(knots) {}
+
+  // The order() values at t. Requires a span of positive length.
+  void values(int span, double t, double* out);
+
+ private:
+  const KnotVector& knots_;
+  int span_ = -1;
+  std::array<double, KnotVector::kMaxDegree*(KnotVector::kMaxDegree + 1) / 2> reciprocals_;
+};
 
 }  // namespace angiospline

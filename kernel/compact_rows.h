@@ -16,6 +16,9 @@ class CompactRows {
   // All entries zero, all runs at column 0. Requires 1 <= width <= columns.
   CompactRows(int rows, int columns, int width);
 
+  // Another matrix in the memory of this one; rows that are not set then have no meaning.
+  void reshape(int rows, int columns, int width);
+
   int rows() const { return static_cast<int>(first_.size()); }
   int columns() const { return columns_; }
   int width() const { return width_; }
@@ -35,6 +38,9 @@ class CompactRows {
 
   // The same with each "point" a block of `stride` consecutive doubles; `out` has rows() blocks.
   void apply_blocks(const double* blocks, std::ptrdiff_t stride, double* out) const;
+
+  // One row of that: `out` is one block.
+  void apply_row(int row, const double* blocks, std::ptrdiff_t stride, double* out) const;
 
   Eigen::SparseMatrix<double> to_sparse() const;  // explicit zeros are kept
   Eigen::MatrixXd to_dense() const;

@@ -180,6 +180,19 @@ CompactRows collocation_matrix(const KnotVector& knots, const std::vector<double
   return A;
 }
 
+void collocate(const KnotVector& knots, const std::vector<double>& parameters, CompactRows& into) {
+  into.reshape(static_cast<int>(parameters.size()), knots.control_point_count(), knots.order());
+  std::array<double, kMaxOrder> values;
+  SpanBasis basis(knots);
+  int span = -1;
+  for (int r = 0; r < into.rows(); ++r) {
+    const double t = parameters[static_cast<std::size_t>(r)];
+    span = knots.span(t, span);
+    basis.values(span, t, values.data());
+    into.set_row(r, span - knots.degree(), values.data(), knots.order());
+  }
+}
+
 std::vector<CompactRows> collocation_matrices(const KnotVector& knots,
                                               const std::vector<double>& parameters,
                                               int derivatives) {

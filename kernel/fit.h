@@ -17,6 +17,9 @@ namespace angiospline {
 CompactRows collocation_matrix(const KnotVector& knots, const std::vector<double>& parameters,
                                int derivative = 0);
 
+// The values into the memory of an earlier matrix.
+void collocate(const KnotVector& knots, const std::vector<double>& parameters, CompactRows& into);
+
 // The same for the derivatives 0 .. derivatives, each basis computed once.
 std::vector<CompactRows> collocation_matrices(const KnotVector& knots,
                                               const std::vector<double>& parameters,

@@ -1,49 +1,28 @@
-// Least-squares trials for data reduction, one direction at a time. Not part of the installed
-// interface.
+// The search for the fewest knots, one direction at a time. Not part of the installed interface.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "base/result.h"
-#include "kernel/knot_algebra.h"
+#include "kernel/reduce_trial.h"
 
 namespace angiospline {
-
-// One direction of a reduction. `points` are control_point_count() blocks of `stride` doubles, in
-// groups of `group` that are measured in the Euclidean norm.
-struct ReductionProblem {
-  const KnotVector& knots;
-  const double* points;
-  int stride;
-  int group;
-  double tolerance;
-  int held_first;
-  int held_last;
-  const std::vector<Knot>& kept;
-  int polish;
-};
 
 struct DirectionResult {
   KnotVector knots;
   std::vector<double> points;  // control_point_count() blocks of the same stride
-  double error_bound;
+  double error_bound;          // or the largest error at the samples (Proof::kSamples)
   int trials;
 };
 
-// The fewest control points found whose error bound is within the tolerance (the original, with
-// bound 0, if none is).
+// The fewest control points found that are within the tolerance (the original, with bound 0, if
+// there are none).
 DirectionResult reduce_direction(const ReductionProblem& problem);
 
-// The least-squares spline over these interior knots, if its error bound is within the tolerance.
+// The least-squares spline over these interior knots, if it is within the tolerance.
 std::optional<DirectionResult> fit_direction(const ReductionProblem& problem,
-                                             const std::vector<double>& interior);
-
-// No point of the difference of two splines over the same domain, given by blocks of control
-// points, is longer than this: control polygon of the difference over all knots of both, then, if
-// that is above `enough`, with the spans concerned cut in four.
-double difference_bound(const KnotVector& a_knots, const double* a, const KnotVector& b_knots,
-                        const double* b, int stride, int group, double enough);
+                                             const Interior& interior);
 
 // The first broken requirement of the options, or nothing.
 std::optional<Error> reduction_option_error(const KnotVector& knots, double tolerance,

@@ -90,6 +90,58 @@ CompactRows refinement_matrix_oslo(const KnotVector& coarse, const KnotVector& f
 
 namespace {
 
+// Rows of discrete B-splines of degree nu over the same old knots: what is divided by is divided by
+// once for all of them.
+class DiscreteRows {
+ public:
+  // `left` and `right` as in discrete_step.
+  void prepare(const double* left, const double* right, int nu) {
+    if (left == left_ && nu == nu_) return;
+    left_ = left;
+    right_ = right;
+    nu_ = nu;
+    double* next = reciprocals_.data();
+    for (int d = 1; d <= nu; ++d) {
+      for (int j = 0; j < d; ++j) *next++ = 1 / (right[j] - left[j - d]);
+    }
+  }
+
+  // The row for new knots t[at[0]], t[at[1]], ...
+  void row(const double* t, const int* at, double* row) const {
+    switch (nu_) {
+      case 3:
+        return fill<3>(t, at, row);
+      case 5:
+        return fill<5>(t, at, row);
+      default:
+        return fill<-1>(t, at, row);
+    }
+  }
+
+ private:
+  template <int kFixed>
+  void fill(const double* t, const int* at, double* row) const {
+    const int nu = kFixed >= 0 ? kFixed : nu_;
+    const double* next = reciprocals_.data();
+    row[0] = 1;
+    for (int d = 1; d <= nu; ++d) {
+      const double x = t[at[d - 1]];
+      double carried = 0;
+      for (int j = 0; j < d; ++j) {
+        const double share = row[j] * *next++;
+        row[j] = carried + share * (right_[j] - x);
+        carried = share * (x - left_[j - d]);
+      }
+      row[d] = carried;
+    }
+  }
+
+  const double* left_ = nullptr;
+  const double* right_ = nullptr;
+  int nu_ = -1;
+  std::array<double, kMaxOrder*(kMaxOrder - 1) / 2> reciprocals_;
+};
+
 // In blossom terms row i is f[t(i+1) .. t(i+p)] written in the coarse control points
 // f[tau(j+1) .. tau(j+p)]. Old knots tau(q+1) .. tau(q+p-nu) inside the window stay as arguments of
 // every point involved; over the other nu arguments it is a blossom of degree nu, whose knots are
@@ -102,6 +154,7 @@ void for_each_row(const KnotVector& coarse, const KnotVector& fine, const Visit&
   const int rows = fine.control_point_count();
   const int coarse_total = static_cast<int>(coarse.knots().size());
   std::array<double, kMaxOrder> row;
+  DiscreteRows discrete;
   // Equal values are matched in order. `q` is the last old knot at or before position i, `ahead`
   // the last one at or before position i + p.
   int q = -1;
@@ -123,15 +176,8 @@ void for_each_row(const KnotVector& coarse, const KnotVector& fine, const Visit&
     while (behind < added_at.size() && added_at[behind] <= i) ++behind;
     q = i - static_cast<int>(behind);
     const int nu = added - static_cast<int>(behind);
-    row[0] = 1;
-    if (nu > 0) {
-      const double* left = tau.at(q + 1);
-      const double* right = tau.at(q + 1 + p - nu);
-      for (int d = 1; d <= nu; ++d) {
-        const int at = added_at[behind + static_cast<std::size_t>(d) - 1];
-        discrete_step(left, right, t[at], d, row.data());
-      }
-    }
+    discrete.prepare(tau.at(q + 1), tau.at(q + 1 + p - nu), nu);
+    discrete.row(t, added_at.data() + behind, row.data());
     visit(i, q - nu, row.data(), nu + 1);
   }
 }
@@ -145,6 +191,20 @@ CompactRows refinement_matrix(const KnotVector& coarse, const KnotVector& fine) 
     A.set_row(i, first, entries, count);
   });
   return A;
+}
+
+void add_refined(double factor, const KnotVector& coarse, const KnotVector& fine,
+                 const double* blocks, int stride, double* out) {
+  EXPECTS(is_refinement(coarse, fine));
+  const int last = coarse.control_point_count() - 1;
+  for_each_row(coarse, fine, [&](int i, int first, const double* entries, int count) {
+    double* sum = out + static_cast<std::ptrdiff_t>(i) * stride;
+    for (int k = std::max(0, -first); k < count && first + k <= last; ++k) {
+      const double share = factor * entries[k];
+      const double* block = blocks + static_cast<std::ptrdiff_t>(first + k) * stride;
+      for (int c = 0; c < stride; ++c) sum[c] += share * block[c];
+    }
+  });
 }
 
 CompactRows refinement_matrix_boehm(const KnotVector& coarse, const KnotVector& fine) {
@@ -278,9 +338,13 @@ BSplineSurface<D> transform_v(const BSplineSurface<D>& surface, const CompactRow
 template <int D>
 BSplineSurface<D> refine(const BSplineSurface<D>& surface, const KnotVector& fine_u,
                          const KnotVector& fine_v) {
-  const CompactRows Av = refinement_matrix(surface.v(), fine_v);
-  const CompactRows Au = refinement_matrix(surface.u(), fine_u);
-  return transform_u(transform_v(surface, Av, fine_v), Au, fine_u);
+  const auto along_u = [&](const BSplineSurface<D>& s) {
+    return transform_u(s, refinement_matrix(s.u(), fine_u), fine_u);
+  };
+  if (fine_v == surface.v()) return along_u(surface);
+  const BSplineSurface<D> finer =
+      transform_v(surface, refinement_matrix(surface.v(), fine_v), fine_v);
+  return fine_u == surface.u() ? finer : along_u(finer);
 }
 
 template <int D>

@@ -35,6 +35,11 @@ CompactRows refinement_matrix(const KnotVector& coarse, const KnotVector& fine);
 CompactRows refinement_matrix_oslo(const KnotVector& coarse, const KnotVector& fine);
 CompactRows refinement_matrix_boehm(const KnotVector& coarse, const KnotVector& fine);
 
+// out += factor * A * blocks with A = refinement_matrix(coarse, fine), which is not built: control
+// points are blocks of `stride` doubles. Requires is_refinement(coarse, fine).
+void add_refined(double factor, const KnotVector& coarse, const KnotVector& fine,
+                 const double* blocks, int stride, double* out);
+
 // The same curve or surface over finer knots. Requires is_refinement in each direction.
 // D is 1 to 4. Linear in the number of fine control points.
 template <int D>
