@@ -5,6 +5,7 @@
 
 #include "kernel/fit.h"
 #include "kernel/grid.h"
+#include "kernel/periodic.h"
 #include "kernel/reduce.h"
 #include "kernel/refinement.h"
 #include "tests/kernel/random_splines.h"
@@ -188,6 +189,67 @@ TEST(FitToTolerance, ComesWithinTheToleranceOfEveryPointWithFewControlPoints) {
   EXPECT_LE((evaluate(fit->curve, parameters) - points).colwise().norm().maxCoeff(), 1e-4);
   EXPECT_LE(fit->curve.knots().control_point_count(), 40);
   EXPECT_FALSE(fit_to_tolerance<2>(5, {0, 1}, points.leftCols<2>(), 1e-4));
+}
+
+// A wavy circle with some 400 control points; its seam has the given multiplicity.
+BSplineCurve<3> closed_wave(int multiplicity) {
+  std::vector<Knot> period{{0, multiplicity}};
+  for (int k = 1; k < 400; ++k) period.push_back({k / 400.0, 1});
+  const KnotVector knots = *periodic_knots(5, period, 1);
+  const auto parameters = spaced(0, 1, 2001);
+  Eigen::Matrix3Xd points(3, 2000);
+  for (int i = 0; i < 2000; ++i) {
+    const double a = 2 * std::numbers::pi * parameters[static_cast<std::size_t>(i)];
+    const double r = 5 + 0.5 * std::cos(4 * a);
+    points.col(i) << r * std::cos(a), r * std::sin(a), 0.3 * std::sin(3 * a);
+  }
+  return *fit_periodic<3>(knots, {parameters.begin(), parameters.end() - 1}, points);
+}
+
+TEST(Reduce, KeepsAClosedCurveClosedAndSmoothAtItsSeam) {
+  for (const int multiplicity : {1, 3}) {
+    const BSplineCurve<3> wave = closed_wave(multiplicity);
+    ASSERT_TRUE(is_periodic(wave));
+    ReductionOptions options;
+    options.held_first = options.held_last = 0;
+    options.tolerance = 1e-3;
+    const auto reduced = reduce(wave, options);
+    ASSERT_TRUE(reduced) << reduced.error().message();
+    EXPECT_TRUE(is_periodic(reduced->curve));
+    EXPECT_LE(*periodic_count(reduced->curve.knots()), 45);
+    const double error = largest_distance(wave, reduced->curve);
+    EXPECT_LE(error, reduced->error_bound + 1e-13);
+    EXPECT_LE(reduced->error_bound, options.tolerance);
+    EXPECT_GT(error, 0.3 * options.tolerance);
+    for (int d = 0; d <= 5 - multiplicity; ++d) {
+      const Eigen::Vector3d start = reduced->curve.at(0, d);
+      EXPECT_LT((start - reduced->curve.at(1, d)).norm(), 1e-9 * (1 + start.norm()));
+    }
+    options.held_first = 1;
+    EXPECT_FALSE(reduce(wave, options));  // a closed curve has no end to hold
+  }
+}
+
+TEST(Reduce, OfARefinedClosedCurveFindsTheOriginalKnots) {
+  Random random(11);
+  for (int round = 0; round < 20; ++round) {
+    const int degree = 2 + random.below(4);
+    std::vector<Knot> period;
+    for (int k = 0; k < degree + 2 + random.below(6); ++k) period.push_back({1.0 * k, 1});
+    const KnotVector knots = *periodic_knots(degree, period, period.back().value + 1);
+    Eigen::Matrix3Xd points(3, *periodic_count(knots));
+    for (Eigen::Index i = 0; i < points.size(); ++i) points.data()[i] = random.uniform(-1, 1);
+    const BSplineCurve<3> curve = periodic_curve<3>(knots, points);
+    std::vector<double> added;
+    for (int k = 0; k < 8; ++k) added.push_back(random.uniform(0.01, knots.last()));
+    ReductionOptions options;
+    options.held_first = options.held_last = 0;
+    options.tolerance = 1e-9;
+    const auto reduced = reduce(*insert_knots_periodic(curve, added), options);
+    ASSERT_TRUE(reduced) << reduced.error().message();
+    EXPECT_EQ(reduced->curve.knots(), knots) << "round " << round;
+    EXPECT_LT((reduced->curve.control_points() - curve.control_points()).norm(), 1e-8);
+  }
 }
 
 TEST(ReduceSurface, TubeStaysWithinToleranceInBothDirections) {
