@@ -13,8 +13,8 @@ namespace angiospline {
 
 using Voxel = std::array<int, 3>;
 
-// The grid of an image in the LPS world: world = origin + direction * (spacing .* index); the centre
-// of voxel (0, 0, 0) is the origin. The columns of `direction` are orthonormal.
+// The grid of an image in the LPS world: world = origin + direction * (spacing .* index); the
+// centre of voxel (0, 0, 0) is the origin. The columns of `direction` are orthonormal.
 struct ImageGrid {
   Voxel size{0, 0, 0};
   Vec3 spacing_mm = Vec3::Ones();

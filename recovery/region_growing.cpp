@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <queue>
 
 #include <fmt/format.h>
@@ -64,7 +65,10 @@ class Grower {
   void label(const Voxel& v) {
     rule_.label_vessel(v);
     seen_.set(v[0], v[1], v[2]);
+    ++labelled_;
   }
+  void watch_front(const Candidate& c);
+  void close_basin();
   void queue_neighbours(const Voxel& v, double fading = 1);
   Decision decide(const Candidate& c);
   Segmentation finished();
@@ -77,6 +81,9 @@ class Grower {
   std::uint64_t order_ = 0;
   GrowReport report_;
   double threshold_sum_ = 0;
+  std::size_t labelled_ = 0;
+  FrontLeap basin_;  // since the front last went darker
+  double darkest_ = std::numeric_limits<double>::infinity();
 };
 
 template <typename T>
@@ -102,8 +109,27 @@ Decision Grower<T>::decide(const Candidate& c) {
   return decision;
 }
 
+// The front takes the brightest voxel it touches: only behind a neck does it get brighter again.
+template <typename T>
+void Grower<T>::watch_front(const Candidate& c) {
+  if (c.grey >= darkest_) return;
+  close_basin();
+  darkest_ = c.grey;
+  basin_ = {c.at, rule_.sign() * c.grey, labelled_, 0};
+}
+
+template <typename T>
+void Grower<T>::close_basin() {
+  constexpr std::size_t kLeast = 100, kLeastShare = 4;
+  if (!std::isfinite(darkest_)) return;
+  basin_.opened = labelled_ - basin_.before;
+  if (basin_.opened >= std::max(kLeast, basin_.before / kLeastShare))
+    report_.leaps.push_back(basin_);
+}
+
 template <typename T>
 Segmentation Grower<T>::finished() {
+  close_basin();
   Segmentation result{Mask(image_.grid), std::move(report_)};
   GrowReport& report = result.report;
   Moments grey_values;
@@ -138,6 +164,7 @@ Result<Segmentation> Grower<T>::grow(const Progress& progress) {
     if (rule_.is_vessel(c.at)) continue;  // a later seed's start took it
     const Decision decision = decide(c);
     if (decision.vessel) {
+      watch_front(c);
       label(c.at);
       queue_neighbours(c.at, decision.fading);
     } else {

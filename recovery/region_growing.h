@@ -40,6 +40,15 @@ struct GrowOptions {
   int seed_search_vox = 1;
 };
 
+// A neck behind which the front found much that is brighter than the neck itself: another vessel
+// behind a narrow or dark place, or tissue behind a leak.
+struct FrontLeap {
+  Voxel neck{0, 0, 0};
+  double grey = 0;         // at the neck
+  std::size_t before = 0;  // voxels of vessel when the front passed it
+  std::size_t opened = 0;  // voxels taken before the front had to go darker than the neck
+};
+
 struct GrowReport {
   std::size_t voxels = 0;      // in the mask
   std::size_t examined = 0;    // voxels that were compared with their threshold
@@ -48,6 +57,9 @@ struct GrowReport {
   double threshold_min = 0;    // over all voxels examined: lowest, mean and highest threshold, in
   double threshold_mean = 0;   // grey values of the image; 0 if none was examined
   double threshold_max = 0;
+  // Where the front grew suddenly, in the order of growing (from bright to dark): `opened` is at
+  // least a quarter of `before`, and 100 voxels.
+  std::vector<FrontLeap> leaps;
   double vessel_mean = 0;  // grey values of the mask
   double vessel_deviation = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -170,7 +171,6 @@ Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
                            SegmentReport& report) {
   GrowOptions grow;
   grow.polarity = options.polarity;
-  grow.max_examined = options.max_examined;
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
   std::vector<SeedLevels> all;
   for (const Vec3& seed : report.seeds_mm) {
@@ -218,14 +218,128 @@ Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
 
 // A tree of vessels has few loops (the circle of Willis one, a kissing pair one more); a leak into
 // tissue runs round every dark spot there.
-std::optional<std::string> leak_sign(const Mask& mask) {
-  constexpr std::int64_t kLoops = 20;
-  const TopologyNumbers numbers = topology_numbers(mask);
-  if (numbers.cycles <= kLoops) return std::nullopt;
-  return fmt::format(
+constexpr std::int64_t kLoopsOfALeak = 20;
+constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
+
+struct Attempt {
+  Mask mask;
+  SegmentReport report;
+  std::int64_t loops = 0;
+
+  bool leaks() const { return loops > kLoopsOfALeak; }
+};
+
+// Grows from the report's seeds on the smoothed image, without looking at more than `most_examined`
+// voxels, and cleans the mask up.
+Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, SegmentReport report,
+                        std::size_t most_examined, const Progress& progress) {
+  Result<GrowOptions> choice = chosen(image, options, report);
+  if (!choice) return fail(choice.error());
+  GrowOptions grow = *choice;
+  if (options.max_examined) most_examined = std::min(most_examined, *options.max_examined);
+  grow.max_examined = most_examined;
+  if (report.seeds_found) grow.seed_search_vox = 2;
+  report.neighbourhood_vox = grow.neighbourhood_vox;
+  report.deviations = grow.deviations;
+  report.background = grow.background.value_or(0);
+  Result<Segmentation> grown = grow_region(image, report.seeds_mm, grow, progress);
+  if (!grown) return fail(grown.error());
+  report.grown = std::move(grown->report);
+  if (report.grown.limit_reached && options.max_examined == most_examined)
+    report.warnings.push_back(
+        fmt::format("growing stopped after {} voxels examined", report.grown.examined));
+  Filled holes = fill_holes(std::move(grown->mask), options.largest_hole_vox);
+  Filled cavities = fill_cavities(std::move(holes.mask));
+  Result<ClosedTunnels> closed = close_tunnels(std::move(cavities.mask), {}, progress);
+  if (!closed) return fail(closed.error());
+  report.filled_voxels = holes.voxels + cavities.voxels + closed->voxels;
+  if (closed->tunnels > 0)
+    report.choices.push_back(
+        fmt::format("{} tunnels too narrow to be loops of vessels are filled", closed->tunnels));
+  report.components = component_count(closed->mask, Neighbours::kCorners26);
+  const std::int64_t loops = topology_numbers(closed->mask).cycles;
+  return Attempt{std::move(closed->mask), std::move(report), loops};
+}
+
+// As attempt, but a leak is not followed to its end: vessels are a small part of an image.
+Result<Attempt> cautious_attempt(const AnyImage& image, const SegmentOptions& options,
+                                 const SegmentReport& report, const Progress& progress) {
+  constexpr std::size_t kMuch = 10;  // one part in so many
+  const std::size_t much = grid_of(image).voxel_count() / kMuch;
+  Result<Attempt> first = attempt(image, options, report, much, progress);
+  if (!first || first->leaks() || !first->report.grown.limit_reached) return first;
+  return attempt(image, options, report, kNoLimit, progress);  // so much vessel there is
+}
+
+std::string leak_warning(const Attempt& leaking) {
+  std::string text = fmt::format(
       "the mask has {} loops: it has probably leaked into tissue; a higher background threshold, a "
       "smaller M or other seeds may help",
-      numbers.cycles);
+      leaking.loops);
+  if (leaking.report.grown.limit_reached)
+    text += fmt::format("; growing was stopped after {} voxels", leaking.report.grown.examined);
+  const std::vector<FrontLeap>& leaps = leaking.report.grown.leaps;
+  const auto largest =
+      std::max_element(leaps.begin(), leaps.end(),
+                       [](const FrontLeap& a, const FrontLeap& b) { return a.opened < b.opened; });
+  if (largest != leaps.end())
+    text += fmt::format(
+        "; the front grew most suddenly, by {} voxels, at voxel {},{},{} (grey {:.4g})",
+        largest->opened, largest->neck[0], largest->neck[1], largest->neck[2], largest->grey);
+  return text;
+}
+
+// A background threshold at which the leak should be shut: just above the neck behind which the
+// front first found more than it had before, or else a tenth of the contrast higher.
+double raised_background(const SegmentReport& report, double sign) {
+  constexpr double kStep = 0.1, kAboveNeck = 0.01;
+  const double contrast = report.levels->vessel - report.levels->background;  // of either sign
+  for (const FrontLeap& leap : report.grown.leaps)
+    if (leap.opened >= leap.before && sign * leap.grey > sign * report.background)
+      return leap.grey + kAboveNeck * contrast;
+  return report.background + kStep * contrast;
+}
+
+// The seeds that lie in what the threshold leaves of the vessels.
+std::vector<Vec3> seeds_beyond(const AnyImage& image, const std::vector<Vec3>& seeds,
+                               double background, double sign) {
+  constexpr int kSearch = 2;
+  std::vector<Vec3> left;
+  for (const Vec3& seed : seeds) {
+    const Voxel v = brightest_near(image, seed, kSearch, sign);
+    if (grid_of(image).contains(v) && sign * value_at(image, v) > sign * background)
+      left.push_back(seed);
+  }
+  return left;
+}
+
+// Grows again with higher and higher background thresholds as long as the mask leaks; seeds that
+// were found and are darker were none of vessels. The last attempt if none is sound.
+Result<Attempt> without_leak(const AnyImage& image, SegmentOptions options, Attempt leaking,
+                             const Progress& progress) {
+  constexpr int kAttempts = 8;
+  const double sign = options.polarity == Polarity::kBright ? 1 : -1;
+  std::vector<std::string> first_choices;
+  if (leaking.report.seeds_found) first_choices.push_back(leaking.report.choices.front());
+  for (int k = 0; k < kAttempts && leaking.leaks(); ++k) {
+    SegmentReport report;
+    report.seeds_found = leaking.report.seeds_found;
+    options.background = raised_background(leaking.report, sign);
+    report.seeds_mm = seeds_beyond(image, leaking.report.seeds_mm, *options.background, sign);
+    if (report.seeds_mm.empty() ||
+        (!report.seeds_found && report.seeds_mm.size() < leaking.report.seeds_mm.size()))
+      return leaking;
+    report.choices = first_choices;
+    report.choices.push_back(fmt::format(
+        "the background threshold is {:.4g}, {} of {} seeds lie beyond it: with {:.4g} growing "
+        "leaked into tissue ({} loops)",
+        *options.background, report.seeds_mm.size(), leaking.report.seeds_mm.size(),
+        leaking.report.background, leaking.loops));
+    Result<Attempt> next = cautious_attempt(image, options, report, progress);
+    if (!next) return fail(next.error());
+    leaking = std::move(*next);
+  }
+  return leaking;
 }
 
 }  // namespace
@@ -251,31 +365,14 @@ Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const P
   }
   if (progress.should_stop()) return fail(cancelled("segment"));
   image = smoothed(std::move(image), options.smoothing_vox * grid_of(image).spacing_mm.minCoeff());
-  Result<GrowOptions> choice = chosen(image, options, report);
-  if (!choice) return fail(choice.error());
-  GrowOptions grow = *choice;
-  if (report.seeds_found) grow.seed_search_vox = 2;
-  report.neighbourhood_vox = grow.neighbourhood_vox;
-  report.deviations = grow.deviations;
-  report.background = grow.background.value_or(0);
-  Result<Segmentation> grown = grow_region(image, report.seeds_mm, grow, progress);
-  if (!grown) return fail(grown.error());
-  report.grown = std::move(grown->report);
-  if (report.grown.limit_reached)
-    report.warnings.push_back(
-        fmt::format("growing stopped after {} voxels examined", report.grown.examined));
-  Filled holes = fill_holes(std::move(grown->mask), options.largest_hole_vox);
-  Filled cavities = fill_cavities(std::move(holes.mask));
-  Result<ClosedTunnels> closed = close_tunnels(std::move(cavities.mask), {}, progress);
-  if (!closed) return fail(closed.error());
-  report.filled_voxels = holes.voxels + cavities.voxels + closed->voxels;
-  if (closed->tunnels > 0)
-    report.choices.push_back(
-        fmt::format("{} tunnels too narrow to be loops of vessels are filled", closed->tunnels));
-  report.components = component_count(closed->mask, Neighbours::kCorners26);
-  if (std::optional<std::string> leak = leak_sign(closed->mask))
-    report.warnings.push_back(std::move(*leak));
-  return Segmented{std::move(closed->mask), std::move(report)};
+  Result<Attempt> done = options.background
+                             ? attempt(image, options, std::move(report), kNoLimit, progress)
+                             : cautious_attempt(image, options, report, progress);
+  if (done && done->leaks() && !options.background && done->report.levels)
+    done = without_leak(image, options, std::move(*done), progress);
+  if (!done) return fail(done.error());
+  if (done->leaks()) done->report.warnings.push_back(leak_warning(*done));
+  return Segmented{std::move(done->mask), std::move(done->report)};
 }
 
 }  // namespace angiospline

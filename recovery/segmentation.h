@@ -63,6 +63,9 @@ struct Segmented {
 //   N          odd, 2 r + 1 voxels, 5 to 11
 //   M          2, or less: v - M sigma_v stays above the middle of v and b; at least 1
 //   background b + 2 sigma_b, within 0.2 to 0.4 of the way from b to v
+//              In case the mask leaks (more than 20 loops), the threshold rises step by step until
+//              it does not, first to the neck behind which the front grew suddenly; found seeds
+//              that are darker are dropped.
 //   level      b is the `background_level` of GrowOptions
 // Errors: those of grow_region; a given seed around which no vessel stands out (unless N, M and the
 // background are all given); no seed given and nothing tubular found.

@@ -19,8 +19,8 @@ struct VesselNode {
   std::vector<int> children;   // nodes, in growing order; twice if two arcs lead there
   int level = 0;               // arcs to the root of the component
   int component = 0;
-  int cluster_cycles = 0;      // tunnels and cavities within the cluster,
-  int cluster_cavities = 0;    // which the graph does not show
+  int cluster_cycles = 0;    // tunnels and cavities within the cluster,
+  int cluster_cavities = 0;  // which the graph does not show
 
   bool is_end() const { return arcs.size() < 2; }
 };

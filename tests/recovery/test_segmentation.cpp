@@ -193,6 +193,28 @@ TEST(Segment, WarnsOfALeakIntoTissue) {
   EXPECT_NE(leaked->report.warnings[0].find("leaked"), std::string::npos);
 }
 
+TEST(Segment, RaisesTheThresholdUntilALeakIsShut) {
+  PhantomOptions phantom;
+  phantom.snr = 12;
+  const auto p = make_phantom(PhantomKind::kCylinder, phantom);
+  Image<std::int16_t> image = p->image;  // bars of tissue, brighter than half of the vessel
+  for (std::size_t i = 0; i < image.voxels.size(); ++i) {
+    const Voxel v = image.grid.voxel(i);
+    const int in_bars = (v[0] % 12 < 5) + (v[1] % 12 < 5) + (v[2] % 12 < 5);
+    if (p->truth.voxels[i] == 0 && in_bars >= 2)
+      image.voxels[i] = static_cast<std::int16_t>(image.voxels[i] + 560);
+  }
+  SegmentOptions o;
+  o.seeds_mm = {Vec3(31.5, 31.5, 31.5)};
+  const auto s = segment(image, o);
+  ASSERT_TRUE(s.has_value()) << s.error().message();
+  EXPECT_TRUE(s->report.warnings.empty());
+  EXPECT_TRUE(std::any_of(s->report.choices.begin(), s->report.choices.end(), [](const auto& text) {
+    return text.find("growing leaked") != std::string::npos;
+  }));
+  EXPECT_GT(compare_masks(p->truth, s->mask)->dice, 0.95);
+}
+
 TEST(Segment, DarkVesselsAreFoundToo) {
   PhantomOptions o;
   o.background = 1200;
