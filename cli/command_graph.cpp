@@ -23,6 +23,7 @@ int run_graph(const GraphArguments& arguments) {
   VesselsOptions options;
   if (arguments.root_mm) options.roots_mm.push_back(*arguments.root_mm);
   options.keep_twigs = arguments.keep_twigs;
+  options.cut_contacts = arguments.cut_contacts;
   if (!arguments.mask.empty()) {
     options.skeleton = std::move(*mask);
     const auto second = read_image(arguments.mask, {}, console.progress());
@@ -43,10 +44,17 @@ int run_graph(const GraphArguments& arguments) {
   if (arguments.table) fmt::print("{}", level_order_table(vessels->graph));
   if (arguments.json) {
     Json json = graph_json(tree);
+    json["contacts"] = contacts_json(*vessels);
     json["twigs_pruned"] = vessels->twigs;
     json["seconds"] = seconds_json(watch);
     print_json(json);
   }
+  for (const VesselContact& contact : vessels->contacts)
+    console.say(fmt::format("note: {} at {:.4g},{:.4g},{:.4g} mm{}",
+                            contact.kind == ContactKind::kKissing ? "two vessels touch"
+                                                                  : "a bridge between two vessels",
+                            contact.at_mm.x(), contact.at_mm.y(), contact.at_mm.z(),
+                            vessels->contacts_cut > 0 ? ": cut" : " (--cut-contacts parts them)"));
   console.say(fmt::format("{} nodes, {} branches, {} cycles, {} components; {} twigs pruned",
                           tree.nodes.size(), tree.branches.size(), cycle_count(tree),
                           component_count(tree), vessels->twigs));

@@ -86,6 +86,7 @@ Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder&
   if (auto error = flooded(segmented->mask, arguments.segment.image)) return fail(*error);
   VesselsOptions options;
   if (arguments.root_mm) options.roots_mm.push_back(*arguments.root_mm);
+  options.cut_contacts = arguments.cut_contacts;
   auto vessels = vessels_from_mask(segmented->mask, options, progress);
   if (!vessels) return fail(vessels.error());
   watch.lap("graph");
@@ -156,6 +157,7 @@ int run_recover(const RecoverArguments& arguments) {
     Json json = model_json(recovered->model);
     json["segment"] = segmentation_json(recovered->segment);
     json["graph"] = graph_json(recovered->vessels.tree);
+    json["contacts"] = contacts_json(recovered->vessels);
     json["seconds"] = seconds_json(watch);
     json["files"] = files;
     json["check"] = to_json(*certificate);

@@ -45,6 +45,7 @@ struct SeedArguments {
 struct RecoverArguments {
   SegmentArguments segment;
   std::optional<Vec3> root_mm;
+  bool cut_contacts = false;
   std::string output_folder;
   bool json = false;
 };
@@ -61,6 +62,7 @@ struct GraphArguments {
   std::vector<std::string> outputs;
   std::optional<Vec3> root_mm;
   bool keep_twigs = false;
+  bool cut_contacts = false;
   bool table = false;
   bool json = false;
 };

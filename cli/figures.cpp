@@ -80,6 +80,17 @@ Json graph_json(const CenterlineTree& tree) {
           {"assumptions", tree.assumptions}};
 }
 
+Json contacts_json(const Vessels& vessels) {
+  Json contacts = Json::array();
+  for (const VesselContact& contact : vessels.contacts)
+    contacts.push_back({{"kind", contact.kind == ContactKind::kKissing ? "kissing" : "bridge"},
+                        {"position_mm", to_json(contact.at_mm)},
+                        {"radii_mm", {contact.a.radius_mm, contact.b.radius_mm}},
+                        {"distance_mm", contact.distance_mm},
+                        {"cut", vessels.contacts_cut > 0}});
+  return contacts;
+}
+
 Json model_json(const Model& model) {
   Json failed = Json::array();
   for (const FailedPart& part : model.failed)

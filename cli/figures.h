@@ -14,6 +14,7 @@ Json to_json(const Vec3& v);
 Json seconds_json(const Stopwatch& watch);
 Json segmentation_json(const SegmentReport& report);
 Json graph_json(const CenterlineTree& tree);
+Json contacts_json(const Vessels& vessels);
 
 // branches, junctions, loops, failed, assumptions, warnings: what seed and recover share.
 Json model_json(const Model& model);

@@ -66,6 +66,12 @@ void add_root_option(CLI::App* command, std::optional<Vec3>& root_mm) {
       ->type_name("X,Y,Z");
 }
 
+void add_cut_option(CLI::App* command, bool& cut_contacts) {
+  command->add_flag(
+      "--cut-contacts", cut_contacts,
+      "part vessels that touch but do not join, and cut thin bridges between vessels");
+}
+
 void add_json_flag(CLI::App* command, bool& json) {
   command->add_flag("--json", json, "print the figures as one JSON object on standard output");
 }
@@ -99,6 +105,7 @@ void add_recover(CLI::App& app, CommandLine& line) {
   command->add_option("-o,--output", line.recover.output_folder, "folder for the results")
       ->required();
   add_root_option(command, line.recover.root_mm);
+  add_cut_option(command, line.recover.cut_contacts);
   add_json_flag(command, line.recover.json);
   command->callback([&line] { line.verb = [&line] { return run_recover(line.recover); }; });
 }
@@ -153,6 +160,7 @@ void add_graph(CLI::App& app, CommandLine& line) {
   command->add_option("-o,--output", a.outputs,
                       "centerline files to write: .swc .csv .graphml .vtp");
   add_root_option(command, a.root_mm);
+  add_cut_option(command, a.cut_contacts);
   command->add_flag("--keep-twigs", a.keep_twigs, "do not prune");
   command->add_flag("--table", a.table, "print the level-order table of nodes");
   add_json_flag(command, a.json);

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "recovery/contacts.h"
 #include "recovery/junction_merging.h"
 
 namespace angiospline {
@@ -43,16 +44,63 @@ Result<PrunedSkeleton> pruned_axis(const Mask& mask, const VesselsOptions& optio
 
 }  // namespace
 
-Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& options,
+namespace {
+
+// What was found to touch, in words.
+std::string contact_text(const VesselContact& contact) {
+  return fmt::format(
+      "{} at ({:.4g}, {:.4g}, {:.4g}) mm: radii {:.3g} and {:.3g} mm, axes {:.3g} mm apart",
+      contact.kind == ContactKind::kKissing ? "two vessels touch"
+                                            : "a bridge thinner than both its vessels",
+      contact.at_mm.x(), contact.at_mm.y(), contact.at_mm.z(), contact.a.radius_mm,
+      contact.b.radius_mm, contact.distance_mm);
+}
+
+// The pruned axis of the mask with its contacts cut; cutting may bring others to light.
+struct Parted {
+  Mask mask;
+  PrunedSkeleton axis;
+  int cut = 0;
+};
+
+Result<Parted> parted(const Mask& mask, VesselsOptions options, std::vector<VesselContact> contacts,
+                      const Progress& progress) {
+  constexpr int kRounds = 4;
+  options.skeleton.reset();
+  Parted out{mask, {}, 0};
+  for (int k = 0; k < kRounds && !contacts.empty(); ++k) {
+    out.cut += static_cast<int>(contacts.size());
+    out.mask = cut_contacts(std::move(out.mask), contacts);
+    Result<PrunedSkeleton> axis = pruned_axis(out.mask, options, progress);
+    if (!axis) return fail(axis.error());
+    out.axis = std::move(*axis);
+    contacts = find_contacts(out.axis.graph, out.mask);
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<Vessels> vessels_from_mask(const Mask& given, const VesselsOptions& options,
                                   const Progress& progress) {
   Vessels vessels;
+  Mask cut_mask;
   const Connectivity connectivity = options.thinning.connectivity;
-  vessels.before = topology_numbers(mask, connectivity);
+  vessels.before = topology_numbers(given, connectivity);
   if (vessels.before.components == 0)
     return fail(
         {ErrorKind::kBadInput, "mask is empty", {}, {}, "at least one voxel must be foreground"});
-  Result<PrunedSkeleton> pruned = pruned_axis(mask, options, progress);
+  Result<PrunedSkeleton> pruned = pruned_axis(given, options, progress);
   if (!pruned) return fail(pruned.error());
+  vessels.contacts = find_contacts(pruned->graph, given);
+  if (options.cut_contacts && !vessels.contacts.empty()) {
+    Result<Parted> apart = parted(given, options, vessels.contacts, progress);
+    if (!apart) return fail(apart.error());
+    cut_mask = std::move(apart->mask);
+    pruned = std::move(apart->axis);
+    vessels.contacts_cut = apart->cut;
+  }
+  const Mask& mask = vessels.contacts_cut > 0 ? cut_mask : given;
   vessels.skeleton = std::move(pruned->skeleton);
   vessels.twigs = pruned->twigs;
   vessels.after = topology_numbers(vessels.skeleton, connectivity);
@@ -61,7 +109,7 @@ Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& option
   for (const VesselNode& node : graph.nodes) vessels.hidden_cycles += node.cluster_cycles;
   std::vector<int> roots;
   for (const Vec3& root : options.roots_mm) roots.push_back(nearest_node(graph, root));
-  const std::size_t given = roots.size();
+  const std::size_t given_roots = roots.size();
   for (const int n : thickest_ends(graph, mask)) roots.push_back(n);
   vessels.graph = rooted_at(graph, roots);  // the first root in a component rules: the given one
   Result<CenterlineTree> tree =
@@ -71,8 +119,11 @@ Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& option
   for (const int inlet : vessels.tree.inlets)
     vessels.tree.assumptions.push_back(
         fmt::format("inlet {}: {}", vessels.tree.nodes[static_cast<std::size_t>(inlet)].name,
-                    given > 0 ? "nearest to a given root, or else the thickest end"
-                              : "the thickest end, since no root was given"));
+                    given_roots > 0 ? "nearest to a given root, or else the thickest end"
+                                    : "the thickest end, since no root was given"));
+  for (const VesselContact& contact : vessels.contacts)
+    vessels.tree.assumptions.push_back(contact_text(contact) +
+                                       (vessels.contacts_cut > 0 ? "; cut" : "; taken as joined"));
   if (vessels.hidden_cycles > 0)
     vessels.tree.assumptions.push_back(
         fmt::format("{} tunnels of the mask are no wider than a junction and no loops of the tree",

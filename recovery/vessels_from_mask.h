@@ -8,6 +8,7 @@
 #include "base/result.h"
 #include "modeling/centerline_tree.h"
 #include "recovery/centerlines_from_graph.h"
+#include "recovery/contacts.h"
 #include "recovery/pruning.h"
 #include "recovery/thinning.h"
 #include "recovery/topology_numbers.h"
@@ -25,12 +26,17 @@ struct VesselsOptions {
   std::vector<Vec3> roots_mm;
   std::optional<Mask> skeleton;  // an axis of the mask that is taken instead of thinning
   bool keep_twigs = false;       // nothing is pruned
+  // Vessels that touch but do not join are parted and the mask is thinned anew, which an axis given
+  // as `skeleton` does not survive.
+  bool cut_contacts = false;
 };
 
 struct Vessels {
-  Mask skeleton;           // pruned, one voxel thick
-  VesselGraph graph;       // rooted at the inlets
-  CenterlineTree tree;     // nodes and branches in the graph's order, without lonely voxels
+  Mask skeleton;        // pruned, one voxel thick
+  VesselGraph graph;    // rooted at the inlets
+  CenterlineTree tree;  // nodes and branches in the graph's order, without lonely voxels
+  std::vector<VesselContact> contacts;  // found before anything was cut
+  int contacts_cut = 0;
   int twigs = 0;           // branches pruned
   int merged = 0;          // junctions that became part of a neighbour
   int hidden_cycles = 0;   // tunnels within junctions, too small to be loops of the tree
