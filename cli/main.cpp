@@ -245,7 +245,8 @@ void add_reproduce(CLI::App& app, CommandLine& line) {
       "reproduce", "the thesis's experiments on phantoms, its figures beside ours");
   ReproduceArguments& a = line.reproduce;
   command->add_option("TABLE", a.tables,
-                      "7.1 7.2 7.3 7.4 7.5 cylinder potato 7.6 vessel bifurcation (default: all)");
+                      "7.1 7.2 7.3 7.4 7.5 cylinder potato 7.6 vessel bifurcation smoothing "
+                      "(default: all)");
   command->add_flag("--quick", a.quick, "a few rows and iterations only, to see that it runs");
   command->add_option("--random-seed", a.random_seed, "of the noise");
   add_json_flag(command, a.json);

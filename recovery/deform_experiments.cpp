@@ -109,7 +109,8 @@ const std::vector<Entry>& entries() {
       {"potato", "potato 64^3, coarse and refined mesh (7.3.3)", potato},
       {"7.6", "potato with noise, refined mesh", noise},
       {"vessel", "small bent vessel 32 x 32 x 48 (7.3.3)", small_vessel},
-      {"bifurcation", "bifurcation of 12 surfaces, 128^3 (7.3.4)", bifurcation}};
+      {"bifurcation", "bifurcation of 12 surfaces, 128^3 (7.3.4)", bifurcation},
+      {"smoothing", "tangent-plane continuity of a bifurcation (7.2.4)", smoothing}};
   return all;
 }
 

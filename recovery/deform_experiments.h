@@ -39,7 +39,7 @@ struct ReproducedTable {
 };
 
 // 7.1 (region growing), 7.2 to 7.5 (contours), cylinder, potato, 7.6 (noise), vessel, bifurcation
-// (surfaces): in this order.
+// (surfaces), smoothing (7.2.4): in this order.
 const std::vector<std::string>& reproducible_tables();
 
 struct ReproduceOptions {

@@ -18,6 +18,7 @@ Result<ReproducedTable> potato(const ReproduceOptions&, const Progress&);
 Result<ReproducedTable> noise(const ReproduceOptions&, const Progress&);  // 7.6
 Result<ReproducedTable> small_vessel(const ReproduceOptions&, const Progress&);
 Result<ReproducedTable> bifurcation(const ReproduceOptions&, const Progress&);
+Result<ReproducedTable> smoothing(const ReproduceOptions&, const Progress&);  // 7.2.4
 
 // thesis_options, with the time step an explicit step bears: massless methods divide by the
 // damping, whose least eigenvalue l (of those not 0) makes forces of steepness s move a mesh by s /

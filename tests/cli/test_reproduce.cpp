@@ -19,6 +19,16 @@ TEST(CommandReproduce, GivesTablesAsJsonWithBothFigures) {
   EXPECT_TRUE(table["rows"][5]["figures"][0]["ours"].is_number());
 }
 
+TEST(CommandReproduce, SmoothsTheThesissBoundaries) {
+  const auto run = run_angiospline({"reproduce", "smoothing", "--quick", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto table = nlohmann::json::parse(run.out)["tables"][0];
+  EXPECT_EQ(table["rows"].size(), 7U);
+  EXPECT_EQ(table["rows"][1]["figures"][0]["thesis"], 134);
+  EXPECT_EQ(table["rows"][1]["figures"][0]["ours"], 90);
+  for (const auto& trend : table["trends"]) EXPECT_TRUE(trend["holds"]) << trend.dump();
+}
+
 TEST(CommandReproduce, UnknownTableIsBadInput) {
   const auto run = run_angiospline({"reproduce", "9.9"});
   EXPECT_EQ(run.exit_code, 2);
