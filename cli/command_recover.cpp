@@ -12,6 +12,7 @@
 #include "io/centerline_export.h"
 #include "io/certificate_json.h"
 #include "io/report_html.h"
+#include "recovery/fit_model.h"
 #include "recovery/morphology.h"
 #include "recovery/topology_numbers.h"
 
@@ -79,6 +80,33 @@ std::optional<Error> flooded(const Mask& mask, const std::string& image) {
                "give other seeds or a higher background threshold; `segment` writes the mask"};
 }
 
+// The model of a tree, fitted to the image; where that cannot be done the walls are as the mask's
+// radii have them, with a warning.
+Result<Model> model_of(const CenterlineTree& tree, const RecoverArguments& arguments,
+                       const Progress& progress, Stopwatch& watch) {
+  std::optional<Error> unfit;
+  if (arguments.fit) {
+    const std::string& path = arguments.segment.image;
+    const auto file = read_image(path, {}, progress);
+    if (!file) return fail(file.error());
+    FitOptions options;
+    options.dark = arguments.segment.dark;
+    auto fitted = grey_image(file->image, path).and_then([&](const Image<float>& image) {
+      return fit_tree(tree, image, options, progress);
+    });
+    watch.lap("fit");
+    if (fitted) return std::move(fitted->model);
+    if (fitted.error().kind == ErrorKind::kCancelled) return fail(fitted.error());
+    unfit = fitted.error();
+  }
+  auto model = seed_model(tree, {}, progress);
+  if (model && unfit) {
+    model->warnings.push_back("the walls were not fitted to the image: " + unfit->message());
+  }
+  watch.lap("model");
+  return model;
+}
+
 Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder& folder,
                           const Progress& progress, Stopwatch& watch) {
   auto segmented = segment_image(arguments.segment, progress, watch);
@@ -95,14 +123,13 @@ Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder&
     return fail(written.error());
   }
   watch.lap("write stages");
-  auto model = seed_model(vessels->tree, {}, progress);
+  auto model = model_of(vessels->tree, arguments, progress, watch);
   if (!model) return fail(model.error());
   model->name = fs::path(arguments.segment.image).stem().stem().string();
   const SegmentReport& report = segmented->report;
   model->assumptions.insert(model->assumptions.begin(), report.choices.begin(),
                             report.choices.end());
   model->warnings.insert(model->warnings.begin(), report.warnings.begin(), report.warnings.end());
-  watch.lap("model");
   return Recovered{std::move(segmented->report), std::move(*vessels), std::move(*model)};
 }
 

@@ -47,6 +47,19 @@ struct RecoverArguments {
   std::optional<Vec3> root_mm;
   bool cut_contacts = false;
   std::string output_folder;
+  bool fit = true;  // the model to the image, after it is seeded
+  bool json = false;
+};
+
+struct FitArguments {
+  std::string model;
+  std::string image;
+  std::vector<std::string> outputs;
+  std::string truth;     // a mask to measure the result by; may be empty
+  std::string residual;  // .glb or .vtp with what is left as colours; may be empty
+  bool dark = false;
+  bool capture = true;
+  std::string step_schema = "AP242";
   bool json = false;
 };
 
@@ -120,6 +133,7 @@ struct ReproduceArguments {
 };
 
 int run_recover(const RecoverArguments& arguments);
+int run_fit(const FitArguments& arguments);
 int run_seed(const SeedArguments& arguments);
 int run_segment(const SegmentArguments& arguments);
 int run_thin(const ThinArguments& arguments);

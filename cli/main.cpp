@@ -84,6 +84,7 @@ void add_schema_option(CLI::App* command, std::string& schema) {
 // Everything the command line can hold; the chosen verb is run after parsing.
 struct CommandLine {
   RecoverArguments recover;
+  FitArguments fit;
   SeedArguments seed;
   SegmentArguments segment;
   ThinArguments thin;
@@ -133,6 +134,28 @@ void add_seed(CLI::App& app, CommandLine& line) {
   add_schema_option(command, a.step_schema);
   add_json_flag(command, a.json);
   command->callback([&line] { line.verb = [&line] { return run_seed(line.seed); }; });
+}
+
+void add_fit(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("fit", "move a model's walls to where an image shows them");
+  FitArguments& a = line.fit;
+  command->add_option("MODEL", a.model, "native model (.json)")->required();
+  command->add_option("IMAGE", a.image, "the image it came from")->required();
+  command
+      ->add_option(
+          "-o,--output", a.outputs,
+          "files to write, by suffix: .step .iges .brep .glb .stl .vtp .vtu .json .html .geo")
+      ->required();
+  command->add_option("--truth", a.truth, "mask to measure the result by");
+  command->add_option("--residual", a.residual,
+                      ".glb or .vtp to write with what is left of the distance as colours");
+  command->add_flag("--dark", a.dark, "vessels are darker than their background");
+  command->add_flag("!--no-capture", a.capture,
+                    "refine the surfaces as they are; do not move centerlines and radii first");
+  add_schema_option(command, a.step_schema);
+  add_json_flag(command, a.json);
+  command->callback([&line] { line.verb = [&line] { return run_fit(line.fit); }; });
 }
 
 void add_segment(CLI::App& app, CommandLine& line) {
@@ -261,8 +284,8 @@ int run(int argc, char** argv) {
   app.option_defaults()->always_capture_default();
   CommandLine line;
   for (const auto add :
-       {add_recover, add_seed, add_segment, add_thin, add_graph, add_smooth, add_check, add_compare,
-        add_compare_masks, add_convert, add_phantom, add_reproduce}) {
+       {add_recover, add_seed, add_fit, add_segment, add_thin, add_graph, add_smooth, add_check,
+        add_compare, add_compare_masks, add_convert, add_phantom, add_reproduce}) {
     add(app, line);
   }
   try {

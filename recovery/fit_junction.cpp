@@ -23,7 +23,8 @@ constexpr int kPoints = kSize * kSize;
 constexpr double kDistance = 10.0;  // weights of the squared terms at each sample, in radii
 constexpr double kAnchor = 0.2;
 constexpr double kTangent = 0.5;
-constexpr double kRoughness = 0.002;  // second differences of the net's move
+// Second differences of the net's move: the first that passes every gate.
+constexpr std::array<double, 3> kRoughness{0.002, 0.03, 0.5};
 constexpr double kProximal = 0.01;
 constexpr double kCoefficients = 1e-3;
 constexpr double kShift = 1e-12;      // -eps in the corner of the KKT matrix
@@ -222,8 +223,9 @@ struct PatchEnergy {
 
 class JunctionMover {
  public:
-  JunctionMover(LocalJunction& local, const std::vector<JunctionSample>& samples)
+  JunctionMover(LocalJunction& local, const std::vector<JunctionSample>& samples, double roughness)
       : local_(local),
+        roughness_(roughness),
         coefficients_(best_coefficients(local.edges, local.net)),
         energies_(make_energies(samples)),
         system_(make_system()) {}
@@ -332,7 +334,7 @@ class JunctionMover {
           b(middle) = -2;
           const Vec3 now = P * b;
           for (int d = 0; d < 3; ++d) {
-            energy.add(b, Vec3::Unit(d), now(d), kRoughness / (scale * scale));
+            energy.add(b, Vec3::Unit(d), now(d), roughness_ / (scale * scale));
           }
         }
       }
@@ -355,6 +357,7 @@ class JunctionMover {
   }
 
   LocalJunction& local_;
+  double roughness_;
   Eigen::VectorXd coefficients_;
   std::vector<PatchEnergy> energies_;
   std::vector<JacobianEntry> entries_;
@@ -418,6 +421,49 @@ bool is_smooth(const LocalJunction& local) {
   return tangent_plane_residual(local.edges, local.net, c).cwiseAbs().maxCoeff() < kStartsSmooth;
 }
 
+// Moves the net to its samples; what went wrong, or nothing.
+std::string solve(LocalJunction& local, const std::vector<JunctionSample>& samples,
+                  double roughness) {
+  JunctionMover mover(local, samples, roughness);
+  for (int k = 0; k < kSteps; ++k) {
+    const double moved = mover.step(true);
+    if (moved < 0) return "its equations could not be solved";
+    if (moved < 1e-3) break;
+  }
+  double left = mover.residual();
+  for (int k = 0; k < kPolish && left > kSolved; ++k) {
+    if (mover.step(false) < 0) return "its equations could not be solved";
+    const double now = mover.residual();
+    if (now > 0.5 * left && now < 1e-10) break;
+    left = now;
+  }
+  return {};
+}
+
+// The first gate that the net does not pass, or nothing.
+std::string judge(const LocalJunction& local, const std::vector<std::vector<Vec3>>& old_normals,
+                  double least_jacobian, MovedJunction& figures) {
+  const auto normals = normals_of(local);
+  figures.jacobian_ratio = jacobian_ratio(normals);
+  figures.worst_angle_deg = worst_angle_deg(local);
+  double least_cos = 1;
+  for (std::size_t p = 0; p < normals.size(); ++p) {
+    for (std::size_t k = 0; k < normals[p].size(); ++k) {
+      least_cos =
+          std::min(least_cos, normals[p][k].normalized().dot(old_normals[p][k].normalized()));
+    }
+  }
+  if (!(figures.worst_angle_deg <= kWorstAngleDeg)) {
+    return fmt::format("normals of neighbouring patches would differ by {:.2g} degrees",
+                       figures.worst_angle_deg);
+  }
+  if (!(figures.jacobian_ratio >= least_jacobian)) {
+    return fmt::format("it would fold (Jacobian ratio {:.2g})", figures.jacobian_ratio);
+  }
+  if (!(least_cos >= kMostTurnedCos)) return "a normal would turn by more than 60 degrees";
+  return {};
+}
+
 }  // namespace
 
 MovedJunction move_junction(const SurfaceNetwork& network, const std::vector<StripRing>& rings,
@@ -452,38 +498,13 @@ MovedJunction move_junction(const SurfaceNetwork& network, const std::vector<Str
     if (found != shift.end()) local.net.points.col(static_cast<Eigen::Index>(k)) += found->second;
   }
 
-  JunctionMover mover(local, samples);
-  for (int k = 0; k < kSteps; ++k) {
-    const double moved = mover.step(true);
-    if (moved < 0) return {{}, "its equations could not be solved", 0, 0};
-    if (moved < 1e-3) break;
-  }
-  double left = mover.residual();
-  for (int k = 0; k < kPolish && left > kSolved; ++k) {
-    if (mover.step(false) < 0) return {{}, "its equations could not be solved", 0, 0};
-    const double now = mover.residual();
-    if (now > 0.5 * left && now < 1e-10) break;
-    left = now;
-  }
-
-  const auto normals = normals_of(local);
-  result.jacobian_ratio = jacobian_ratio(normals);
-  result.worst_angle_deg = worst_angle_deg(local);
-  double least_cos = 1;
-  for (std::size_t p = 0; p < normals.size(); ++p) {
-    for (std::size_t k = 0; k < normals[p].size(); ++k) {
-      least_cos =
-          std::min(least_cos, normals[p][k].normalized().dot(old_normals[p][k].normalized()));
-    }
-  }
   const double wanted = std::max(kLeastJacobian, 0.5 * jacobian_ratio(old_normals));
-  if (!(result.worst_angle_deg <= kWorstAngleDeg)) {
-    result.failure = fmt::format("normals of neighbouring patches would differ by {:.2g} degrees",
-                                 result.worst_angle_deg);
-  } else if (!(result.jacobian_ratio >= wanted)) {
-    result.failure = fmt::format("it would fold (Jacobian ratio {:.2g})", result.jacobian_ratio);
-  } else if (!(least_cos >= kMostTurnedCos)) {
-    result.failure = "a normal would turn by more than 60 degrees";
+  const JunctionNet start = local.net;
+  for (const double roughness : kRoughness) {
+    local.net = start;
+    result.failure = solve(local, samples, roughness);
+    if (result.failure.empty()) result.failure = judge(local, old_normals, wanted, result);
+    if (result.failure.empty()) break;
   }
   for (std::size_t k = 0; k < local.columns.size(); ++k) {
     result.points[local.columns[k]] = local.net.points.col(static_cast<Eigen::Index>(k));

@@ -78,25 +78,30 @@ Result<FitMesh> make_fit_mesh(const SurfaceNetwork& network, const FitMeshOption
     spacing.longest_edge =
         std::clamp(options.longest_edge_vox * options.voxel_mm / largest, 0.15, 0.4);
   }
-  auto tessellation = tessellate(network, spacing, progress);
+  const auto tessellation = tessellate(network, spacing, progress);
   if (!tessellation) return fail(tessellation.error());
+  return fit_mesh_of(network, *tessellation, options);
+}
 
+FitMesh fit_mesh_of(const SurfaceNetwork& network, const Tessellation& tessellation,
+                    const FitMeshOptions& options) {
   FitMesh mesh;
   const WallPart wall =
-      wall_of(*tessellation, static_cast<int>(network.regions.size()), mesh.regions);
+      wall_of(tessellation, static_cast<int>(network.regions.size()), mesh.regions);
+  mesh.points = wall.points;
   mesh.triangles = wall.triangles;
   std::vector<BSplineSurface<3>> surfaces;
   for (std::size_t p = 0; p < network.patches.size(); ++p) {
     surfaces.push_back(patch_surface(network, static_cast<int>(p)));
   }
   for (const int p : wall.points) {
-    const PatchPoint& origin = tessellation->origins[at(p)];
+    const PatchPoint& origin = tessellation.origins[at(p)];
     const SurfaceJet jet = surface_jet(surfaces[at(origin.patch)], origin.uv.x(), origin.uv.y());
     const FundamentalForms forms = fundamental_forms(jet);
     const PrincipalCurvatures curvatures = principal_curvatures(jet);
     WallPoint node;
-    node.point_mm = tessellation->mesh.points_mm.col(p);
-    node.normal = forms.regular ? forms.normal : Vec3(tessellation->mesh.normals.col(p));
+    node.point_mm = tessellation.mesh.points_mm.col(p);
+    node.normal = forms.regular ? forms.normal : Vec3(tessellation.mesh.normals.col(p));
     node.largest_curvature = -curvatures.smallest;
     node.smallest_curvature = -curvatures.largest;
     mesh.nodes.push_back(node);

@@ -17,6 +17,7 @@ namespace angiospline {
 // Patches share the nodes of their joins, so that what is smooth on the mesh is smooth across them.
 struct FitMesh {
   std::vector<WallPoint> nodes;
+  std::vector<int> points;          // of the tessellation, one for each node
   std::vector<PatchPoint> origins;  // where each lies on the network; one of several on an edge
   std::vector<int> regions;         // of the network; on an edge between two, the lower
   std::vector<double> radii_mm;     // of the vessel around each node, from the surface
@@ -39,6 +40,10 @@ struct FitMeshOptions {
 // Errors: the network's first defect; stopped on request. O(nodes).
 Result<FitMesh> make_fit_mesh(const SurfaceNetwork& network, const FitMeshOptions& options,
                               const Progress& progress = {});
+
+// The same of triangles that are there already: the nodes are the points of the wall.
+FitMesh fit_mesh_of(const SurfaceNetwork& network, const Tessellation& tessellation,
+                    const FitMeshOptions& options);
 
 // Unit normals of the mesh after its nodes have moved along theirs: the surface's own normals,
 // turned as the triangles turn.

@@ -24,29 +24,54 @@ void hold_regions(const FitMesh& mesh, const std::vector<char>& hold, Displaceme
   }
 }
 
+Image<float> negated(const Image<float>& image) {
+  Image<float> other = image;
+  for (float& v : other.voxels) v = -v;
+  return other;
+}
+
 class Fitter {
  public:
   Fitter(const Image<float>& image, const FitOptions& options, const Progress& progress)
-      : field_(image), options_(options), progress_(progress) {}
+      : brightened_(options.dark ? negated(image) : Image<float>()),
+        field_(options.dark ? brightened_ : image),
+        options_(options),
+        progress_(progress) {}
+
+  Result<FittedModel> run(const CenterlineTree& tree) {
+    if (const auto apart = check_frames(points_of(tree))) return fail(*apart);
+    const auto captured = capture_tree(tree, field_, progress_);
+    if (!captured) return fail(captured.error());
+    auto seeded = seed_model(captured->tree, options_.seed, progress_);
+    if (!seeded) return fail(seeded.error());
+    FittedModel fitted{std::move(*seeded), {}};
+    fitted.report.mean_axis_move_mm = captured->mean_move_mm;
+    fitted.report.recaptured = captured->recaptured;
+    for (const std::string& name : captured->left_alone) {
+      fitted.report.without_edge.push_back("wall_" + name);
+    }
+    return refined(std::move(fitted));
+  }
 
   Result<FittedModel> run(const Model& model) {
-    FittedModel fitted{model, {}};
-    if (const auto apart = check_frames(model.network)) return fail(*apart);
-    if (options_.capture && !model.tree.branches.empty()) {
-      if (auto captured = capture(fitted); !captured) return fail(captured.error());
-    }
-    SurfaceNetwork& network = fitted.model.network;
-    network = with_finer_bodies(network, options_.body_spans);
-    for (int round = 0; round < options_.rounds; ++round) {
-      if (auto moved = refine(network, fitted.report); !moved) return fail(moved.error());
-    }
-    fitted.report.control_points = static_cast<int>(network.control_points_mm.cols());
-    return fitted;
+    if (const auto apart = check_frames(model.network.control_points_mm)) return fail(*apart);
+    return refined({model, {}});
   }
 
  private:
-  std::optional<Error> check_frames(const SurfaceNetwork& network) const {
-    const Points3& p = network.control_points_mm;
+  static Points3 points_of(const CenterlineTree& tree) {
+    Eigen::Index count = 0;
+    for (const CenterlineBranch& branch : tree.branches) count += branch.points_mm.cols();
+    Points3 points(3, count);
+    count = 0;
+    for (const CenterlineBranch& branch : tree.branches) {
+      points.middleCols(count, branch.points_mm.cols()) = branch.points_mm;
+      count += branch.points_mm.cols();
+    }
+    return points;
+  }
+
+  std::optional<Error> check_frames(const Points3& p) const {
     Eigen::Index covered = 0;
     for (Eigen::Index c = 0; c < p.cols(); ++c) covered += field_.covers(p.col(c)) ? 1 : 0;
     const double share = static_cast<double>(covered) / static_cast<double>(p.cols());
@@ -57,33 +82,28 @@ class Fitter {
         Vec3((grid.size[0] - 1) / 2.0, (grid.size[1] - 1) / 2.0, (grid.size[2] - 1) / 2.0));
     return Error{
         ErrorKind::kBadInput, "the model lies outside the image", "fit",
-        fmt::format("{:.0f} % of its control points are inside; the model is centred at "
+        fmt::format("{:.0f} % of its points are inside; the model is centred at "
                     "({:.4g}, {:.4g}, {:.4g}), the image at ({:.4g}, {:.4g}, {:.4g})",
                     100 * share, center(0), center(1), center(2), middle(0), middle(1), middle(2)),
         "both in one frame (LPS, mm), with half of the model inside the image"};
   }
 
-  // Moves the tree to the image and seeds the model anew; keeps what a reader should know of both.
-  Result<void> capture(FittedModel& fitted) {
-    const auto captured = capture_tree(fitted.model.tree, field_, progress_);
-    if (!captured) return fail(captured.error());
-    fitted.report.mean_axis_move_mm = captured->mean_move_mm;
-    fitted.report.recaptured = captured->recaptured;
-    for (const std::string& name : captured->left_alone) {
-      fitted.report.without_edge.push_back("wall_" + name);
+  Result<FittedModel> refined(FittedModel fitted) {
+    SurfaceNetwork& network = fitted.model.network;
+    network = with_finer_bodies(network, options_.body_spans);
+    for (int round = 0; round < options_.rounds; ++round) {
+      if (auto moved = refine(network, fitted.report); !moved) return fail(moved.error());
     }
-    auto seeded = seed_model(captured->tree, options_.seed, progress_);
-    if (!seeded) return fail(seeded.error());
-    seeded->name = fitted.model.name;
-    seeded->assumptions = fitted.model.assumptions;
-    for (const std::string& warning : fitted.model.warnings) {
-      if (std::find(seeded->warnings.begin(), seeded->warnings.end(), warning) ==
-          seeded->warnings.end()) {
-        seeded->warnings.push_back(warning);
-      }
+    for (const std::string& name : fitted.report.without_edge) {
+      fitted.model.warnings.push_back(
+          fmt::format("no wall found in the image near {}: it was left as it was", name));
     }
-    fitted.model = std::move(*seeded);
-    return {};
+    for (const HeldRegion& held : fitted.report.held) {
+      fitted.model.warnings.push_back(
+          fmt::format("{} was not refined to the image: {}", held.name, held.why));
+    }
+    fitted.report.control_points = static_cast<int>(network.control_points_mm.cols());
+    return fitted;
   }
 
   Result<void> refine(SurfaceNetwork& network, FitReport& report) {
@@ -126,6 +146,7 @@ class Fitter {
     return {};
   }
 
+  Image<float> brightened_;  // dark vessels made bright
   GreyField field_;
   const FitOptions& options_;
   const Progress& progress_;
@@ -169,12 +190,49 @@ Result<Image<float>> grey_image(const AnyImage& image, const std::string& file) 
   return grey;
 }
 
+Result<FittedModel> fit_tree(const CenterlineTree& tree, const Image<float>& image,
+                             const FitOptions& options, const Progress& progress) {
+  if (tree.branches.empty()) {
+    return fail({ErrorKind::kBadInput, "the tree has no branches", tree.source, {}, {}});
+  }
+  return Fitter(image, options, progress).run(tree);
+}
+
 Result<FittedModel> fit_model(const Model& model, const Image<float>& image,
                               const FitOptions& options, const Progress& progress) {
   if (model.network.patches.empty()) {
     return fail({ErrorKind::kBadInput, "the model has no surfaces", model.name, {}, {}});
   }
-  return Fitter(image, options, progress).run(model);
+  if (!options.capture || model.tree.branches.empty()) {
+    return Fitter(image, options, progress).run(model);
+  }
+  auto fitted = fit_tree(model.tree, image, options, progress);
+  if (fitted) {
+    fitted->model.name = model.name;
+    fitted->model.assumptions = model.assumptions;
+  }
+  return fitted;
+}
+
+MeshField wall_residual(const Model& model, const Tessellation& tessellation,
+                        const Image<float>& image, const FitOptions& options) {
+  const Image<float> brightened = options.dark ? negated(image) : Image<float>();
+  const GreyField field(options.dark ? brightened : image);
+  FitMeshOptions spacing;
+  spacing.voxel_mm = field.voxel_mm();
+  const FitMesh mesh = fit_mesh_of(model.network, tessellation, spacing);
+  MeshSmoother smoother(mesh);
+  DisplacementOptions one_round = options.displacement;
+  one_round.half_windows_vox = {options.displacement.half_windows_vox.back()};
+  one_round.wave_factors = {1.0};
+  const Displacement left = wall_displacement(field, mesh, smoother, one_round);
+  MeshField residual{"residual_mm",
+                     Eigen::VectorXd::Constant(tessellation.mesh.points_mm.cols(),
+                                               std::numeric_limits<double>::quiet_NaN())};
+  for (int k = 0; k < mesh.size(); ++k) {
+    if (left.weight(k) > 0) residual.values(mesh.points[at(k)]) = left.normal_mm(k);
+  }
+  return residual;
 }
 
 }  // namespace angiospline

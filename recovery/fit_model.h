@@ -37,7 +37,6 @@ struct FitReport {
   std::vector<std::string> without_edge;  // regions near which the image shows no wall: as seeded
   std::vector<std::string> recaptured;  // branches that lay beside their vessel and were led there
   std::vector<HeldRegion> held;         // regions that would have folded: as seeded
-  std::vector<std::string> warnings;
 };
 
 struct FittedModel {
@@ -49,11 +48,24 @@ struct FittedModel {
 // any contrast, fewer than 4 voxels along an axis.
 Result<Image<float>> grey_image(const AnyImage& image, const std::string& file);
 
-// Fits the whole network, bodies and junctions together (docs/fit.md). Open ends stay open and in
-// their planes; patches keep their common tangent planes. Errors: the model lies outside the
-// image or mostly so (their frames differ); no contrast at the model's wall; stopped on request.
-// Time linear in the wall's area.
+// Fits the whole network, bodies and junctions together (docs/fit.md). With `capture` the model is
+// seeded anew from its tree, as fit_tree does; otherwise its surfaces are refined as they are. Open
+// ends stay open and in their planes; patches keep their common tangent planes. Errors: the model
+// lies outside the image or mostly so (their frames differ); no contrast at the model's wall;
+// stopped on request. Time linear in the wall's area.
 Result<FittedModel> fit_model(const Model& model, const Image<float>& image,
                               const FitOptions& options = {}, const Progress& progress = {});
+
+// The same from centerlines with radii: they are moved to the image (recovery/fit_capture.h), then
+// seeded (modeling/seed_model.h), then the surfaces are refined. Errors: also those of seeding.
+Result<FittedModel> fit_tree(const CenterlineTree& tree, const Image<float>& image,
+                             const FitOptions& options = {}, const Progress& progress = {});
+
+// How far the image would still move each point of a tessellation of the model, along its normal
+// and smoothed by the rule of recovery/fit_displacement.h: "residual_mm", positive where the
+// image's wall lies farther out; NaN inside caps and where nothing could be measured. Large values
+// show where a fit needs a finer model, or the image another look. O(points).
+MeshField wall_residual(const Model& model, const Tessellation& tessellation,
+                        const Image<float>& image, const FitOptions& options = {});
 
 }  // namespace angiospline
