@@ -54,7 +54,7 @@ std::vector<double> interior_knots(const KnotVector& knots) {
 template <int D>
 DirectionResult reduce_u(const BSplineSurface<D>& surface, double tolerance,
                          const SurfaceReductionOptions& options, Proof proof) {
-  constexpr int kLines = 12;
+  constexpr int kLines = 8;
   const int lines = surface.v_count();
   const ReductionProblem problem{.knots = surface.u(),
                                  .points = surface.control_points().data(),

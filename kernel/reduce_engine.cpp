@@ -10,6 +10,8 @@
 namespace angiospline {
 namespace {
 
+constexpr int kMostPasses = 3;  // least squares over the same knots, with new weights
+
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // The best so far and the ways to better ones.
@@ -25,9 +27,11 @@ class Reducer {
     return best_ ? static_cast<int>(best_->trial.interior.size()) : interior_count();
   }
   int sampling_step(int wanted) const;
+  int search_passes() const;
   int resolution(int count) const;
   Trial attempt(const Interior& interior, int step);
-  bool confirm(Trial trial);
+  bool confirm(Trial trial) { return confirm(std::move(trial), search_passes()); }
+  bool confirm(Trial trial, int passes);
   bool confirm(const Interior& interior);
   DirectionResult result();
 
@@ -55,6 +59,7 @@ class Reducer {
   std::optional<TrialSolver::Confirmed> best_;
   std::vector<double> best_share_;  // the shares the best one was drawn from
   Interior refused_;                // what was tried last and could not be confirmed
+  int refused_passes_ = 0;          // after so many passes; 0: there was none
   double optimism_ = 1;  // how much larger the error at all samples was than at some of them
 };
 
@@ -80,25 +85,32 @@ Trial Reducer::attempt(const Interior& interior, int step) {
   return solver_.attempt(interior, step, solver_.norm());
 }
 
+// New weights are for polishing, but few knots are cheap.
+int Reducer::search_passes() const {
+  constexpr int kFew = 64;
+  return interior_count() > kFew || problem_.polish == 0 ? 1 : kMostPasses;
+}
+
 // Makes the trial the best if all samples and then the proof agree.
-bool Reducer::confirm(Trial trial) {
-  if (trial.interior == refused_ && !refused_.empty()) return false;
+bool Reducer::confirm(Trial trial, int passes) {
+  if (trial.interior == refused_ && passes <= refused_passes_) return false;
   if (trial.step != 1) {
     const double seen = trial.error;
     trial = attempt(trial.interior, 1);
     if (seen > 0) optimism_ = std::max(optimism_, trial.error / seen);
   }
   Interior interior = trial.interior;
-  if (auto confirmed = solver_.confirm(std::move(trial))) {
+  if (auto confirmed = solver_.confirm(std::move(trial), passes)) {
     best_ = std::move(confirmed);
     return true;
   }
   refused_ = std::move(interior);
+  refused_passes_ = passes;
   return false;
 }
 
 bool Reducer::confirm(const Interior& interior) {
-  if (interior == refused_ && !refused_.empty()) return false;
+  if (interior == refused_ && refused_passes_ > 0) return false;
   return confirm(attempt(interior, 1));
 }
 
@@ -351,13 +363,17 @@ bool Reducer::improve(int fewer) {
       nearest_share = std::move(current);
     }
     const double likely = step == 1 ? nearest->error : optimism_ * nearest->error;
-    if (likely <= problem_.tolerance && nearest->interior != refused_) break;
+    if (likely <= problem_.tolerance &&
+        (nearest->interior != refused_ || refused_passes_ < kMostPasses)) {
+      break;
+    }
     // No further than the last gain, repeated, would bring it within reach.
     const double hoped = likely * std::pow(std::min(gain, 1.0), moves - move);
     if (move > 0 && hoped > kInReach * problem_.tolerance) return false;
     current = std::move(next);
   }
-  if (!nearest || nearest->error > kInReach * problem_.tolerance || !confirm(std::move(*nearest))) {
+  if (!nearest || nearest->error > kInReach * problem_.tolerance ||
+      !confirm(std::move(*nearest), kMostPasses)) {
     return false;
   }
   best_share_ = std::move(nearest_share);
@@ -367,7 +383,7 @@ bool Reducer::improve(int fewer) {
 // Fewer and fewer knots in growing steps, then in steps of one; about as much work again as the
 // search took.
 void Reducer::improve_while_it_pays() {
-  const long enough = 2 * solver_.work();
+  const long enough = 5 * solver_.work() / 4;
   for (int fewer = 1; solver_.work() < enough;) {
     if (improve(fewer)) {
       fewer *= 2;

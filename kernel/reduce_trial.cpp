@@ -212,9 +212,9 @@ void TrialSolver::measure(Trial& trial) {
   trial.error = std::sqrt(largest);
 }
 
-std::optional<TrialSolver::Confirmed> TrialSolver::confirm(Trial trial) {
+std::optional<TrialSolver::Confirmed> TrialSolver::confirm(Trial trial, int passes) {
   EXPECTS(trial.step == 1);
-  const int passes = problem_.polish == 0 || dense(static_cast<int>(trial.interior.size())) ? 1 : 3;
+  if (dense(static_cast<int>(trial.interior.size()))) passes = 1;
   constexpr double kWithinReach = 1.25;  // of the tolerance: what new weights may gain
   std::vector<double> weights = norm_;
   for (int pass = 1;; ++pass) {

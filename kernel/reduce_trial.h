@@ -72,7 +72,7 @@ class TrialSolver {
     Trial trial;
     double bound;
   };
-  std::optional<Confirmed> confirm(Trial trial);
+  std::optional<Confirmed> confirm(Trial trial, int passes);
 
  private:
   KnotVector trial_knots(const Interior& interior) const;
