@@ -380,12 +380,14 @@ bool Reducer::improve(int fewer) {
   return true;
 }
 
-// Fewer and fewer knots in growing steps, then in steps of one; about as much work again as the
-// search took.
+// Fewer and fewer knots in growing steps, then in steps of one: about a quarter as much work again
+// as the search took, and as much again for every step of more than one that succeeds.
 void Reducer::improve_while_it_pays() {
-  const long enough = 5 * solver_.work() / 4;
+  const long allowance = solver_.work() / 4;
+  long enough = solver_.work() + allowance;
   for (int fewer = 1; solver_.work() < enough;) {
     if (improve(fewer)) {
+      if (fewer > 1) enough = solver_.work() + allowance;
       fewer *= 2;
     } else if (fewer > 1) {
       fewer = 1;
