@@ -2,8 +2,10 @@
 // curved walls are found.
 //   bench_edges speed [edge 256] [threads 1]     a random tree of vessels at SNR 8, 4, 2, 1
 //   bench_edges large [edge 512] [threads 2]     the gated operator alone
+//   bench_edges bias                              offsets on cylinders and spheres
 // The dense convolution applies all 62 masks of 125 weights to every voxel of some slices, row by
 // row so that the compiler can use vectors, and its time is scaled to the volume. CPU seconds.
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -13,8 +15,10 @@
 #include <tbb/global_control.h>
 
 #include "recovery/edge_detection.h"
+#include "recovery/edge_localisation.h"
 #include "recovery/edge_masks.h"
 #include "recovery/phantom.h"
+#include "recovery/rasterize.h"
 
 namespace {
 
@@ -122,6 +126,49 @@ void large(int edge) {
   }
 }
 
+// Mean offset of edges from the true wall, outward positive, on ideal partial volumes.
+void bias() {
+  fmt::print("mean offset (standard deviation) in voxels, outward positive\n");
+  fmt::print("shape      R    peak of the mask     corrected        edges\n");
+  for (const bool ball : {false, true})
+    for (const double radius : {2.5, 5.0, 10.0}) {
+      double sum[2] = {}, squares[2] = {};
+      std::size_t count = 0;
+      for (const double shift : {0.0, 0.23, 0.41}) {
+        ImageGrid grid;
+        const int edge = static_cast<int>(2 * radius) + 24;
+        grid.size = {edge, edge, edge};
+        const Vec3 centre = Vec3::Constant(edge / 2) + shift * Vec3(1, -0.6, 0.3);
+        const Vec3 axis = ball ? Vec3(Vec3::Zero())
+                               : Vec3(Vec3(0.3, 0.2, 1) + shift * Vec3(1, -1, 0)).normalized();
+        const Image<float> filled =
+            coverage(grid, {round_cone(centre - 60 * axis, radius, centre + 60 * axis, radius)});
+        const auto field = find_edges(filled, {EdgeContrast{0.4}, EdgeThinning::kAcross});
+        const auto raw = localise_edges(filled, *field, EdgeCorrection::kNone);
+        const auto better = localise_edges(filled, *field);
+        for (std::size_t i = 0; i < raw.size(); ++i) {
+          const auto offset = [&](const Vec3& p) {
+            const Vec3 d = p - centre;
+            return (d - d.dot(axis) * axis).norm() - radius;
+          };
+          if (((raw[i].point_mm - centre).cwiseAbs().maxCoeff()) > edge / 2 - 6) continue;
+          ++count;
+          for (const int k : {0, 1}) {
+            const double d = offset(k == 0 ? raw[i].point_mm : better[i].point_mm);
+            sum[k] += d;
+            squares[k] += d * d;
+          }
+        }
+      }
+      const auto n = static_cast<double>(count);
+      fmt::print("{:8} {:4}", ball ? "sphere" : "cylinder", radius);
+      for (const int k : {0, 1})
+        fmt::print("   {:+.3f} ({:.3f})", sum[k] / n,
+                   std::sqrt(std::max(0.0, squares[k] / n - sum[k] * sum[k] / n / n)));
+      fmt::print("   {:8}\n", count);
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -132,5 +179,6 @@ int main(int argc, char** argv) {
                                   static_cast<std::size_t>(threads));
   if (what == "speed") speed(edge);
   if (what == "large") large(edge);
+  if (what == "bias") bias();
   return 0;
 }
