@@ -4,6 +4,7 @@
 //   bench_deformation linear [most 1000000]
 // CPU seconds of one thread.
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <numbers>
@@ -43,10 +44,11 @@ void bifurcation() {
   fineness.least_pieces = 2;
   DeformMesh mesh = control_mesh(refine_network(model->network, fineness)->network);
   mesh.nodes_mm.colwise() += Vec3(1, 0.6, 0);
-  const EdgePoints edges =
-      edge_points(*find_edges(phantom->image, {EdgePercentile{97}}), phantom->image.grid);
-  fmt::print("{} patches, {} nodes, {} edges\n", model->network.patches.size(), mesh.node_count(),
-             edges.count());
+  const auto edges_by = [&](EdgeThinning thinning) {
+    return edge_points(*find_edges(phantom->image, {EdgePercentile{97}, thinning}),
+                       phantom->image.grid);
+  };
+  fmt::print("{} patches, {} nodes\n", model->network.patches.size(), mesh.node_count());
 
   // The thesis inverts the assembled matrix of all coordinates; here they share one n x n.
   double seconds = 0;
@@ -65,13 +67,17 @@ void bifurcation() {
         .eval();
   });
   fmt::print("pseudo-inverse, 3n x 3n        {:8.3f} s\n", seconds);
-  for (const DeformMethod method : {DeformMethod::kSparse, DeformMethod::kEulerSvd}) {
-    DeformOptions options =
-        method == DeformMethod::kSparse ? DeformOptions{} : thesis_options(method);
-    if (method == DeformMethod::kEulerSvd) options.time_step = 0.005;
-    const auto fit = timed(seconds, [&] { return deform(mesh, edges, 1, options); });
-    fmt::print("{:10} to the end           {:8.3f} s, {} iterations, {}\n", to_string(method),
-               seconds, fit->report.iterations, to_string(fit->report.termination));
+  for (const EdgeThinning thinning : {EdgeThinning::kNone, EdgeThinning::kAcross}) {
+    const EdgePoints edges = edges_by(thinning);
+    for (const DeformMethod method : {DeformMethod::kSparse, DeformMethod::kEulerSvd}) {
+      DeformOptions options =
+          method == DeformMethod::kSparse ? DeformOptions{} : thesis_options(method);
+      if (method == DeformMethod::kEulerSvd) options.time_step = 0.005;
+      const auto fit = timed(seconds, [&] { return deform(mesh, edges, 1, options); });
+      fmt::print("{:10} on {:6} edges       {:8.3f} s, {} iterations, {}\n", to_string(method),
+                 edges.count(), seconds, fit->report.iterations,
+                 to_string(fit->report.termination));
+    }
   }
 }
 
@@ -112,7 +118,7 @@ void linear(double most) {
           method == DeformMethod::kSparse ? DeformOptions{} : thesis_options(method);
       options.rest_speed = 1e-12;
       double one = 0, many = 0;
-      constexpr int kMore = 10;
+      constexpr int kMore = 4;
       options.most_iterations = 1;
       if (!timed(one, [&] { return deform(mesh, edges, 1, options); })) return;
       options.most_iterations = 1 + kMore;
@@ -122,6 +128,7 @@ void linear(double most) {
       fmt::print("   {:12.2f}   {:11.3f}  ", 1e3 * iteration, 1e6 * iteration / mesh.node_count());
     }
     fmt::print("\n");
+    std::fflush(stdout);
   }
 }
 

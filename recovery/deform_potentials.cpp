@@ -143,7 +143,7 @@ Points3 EdgePotentials::forces(const Points3& nodes_vox, const Points3& normals)
 
 double EdgePotentials::steepness() const {
   if (options_.kind == PotentialKind::kSpring) return options_.strength / options_.reach_vox;
-  return options_.strength / (options_.core_vox > 0 ? options_.core_vox : 2.0);
+  return options_.strength / (2 * std::max(options_.core_vox, 1.0));
 }
 
 }  // namespace angiospline

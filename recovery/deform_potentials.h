@@ -82,8 +82,9 @@ class EdgePotentials {
   // How many edges pulled at each node in the last forces(); and look-ups of a nearest node so far.
   const std::vector<int>& pulls_per_node() const { return pulls_; }
   std::size_t asked() const { return nearest_.asked(); }
-  // How steeply the force on a node with the mean number of edges can change with its place, at
-  // most (without a core: where its edges spread over two voxels): what an implicit step counts on.
+  // How steeply the force on a node with the mean number of edges changes with its place where they
+  // spread over two cores: half of the most that it can. An implicit step that counts on it is
+  // stable.
   double steepness() const;
 
  private:
