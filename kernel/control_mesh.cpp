@@ -65,22 +65,40 @@ double largest(const std::vector<double>& values) {
 }
 
 // New knots that cut every span above the tolerance into the pieces that quadratic convergence asks
-// for; at most four at a time, so that a far first estimate does not overshoot.
+// for; at most four at a time, so that a far first estimate does not overshoot. The bound is larger
+// where long spans meet short ones, so a border may wander through a region span by span: `border`
+// spans on either side, those no shorter, are halved with it.
 std::vector<double> cuts(const KnotVector& knots, const std::vector<double>& distance,
-                         double tolerance) {
-  std::vector<double> added;
-  for (int span = knots.degree(); span < knots.control_point_count(); ++span) {
+                         double tolerance, int border) {
+  const int first = knots.degree();
+  const int last = knots.control_point_count() - 1;
+  const auto length = [&](int span) { return knots[span + 1] - knots[span]; };
+  std::vector<int> pieces(distance.size(), 1);
+  for (int span = first; span <= last; ++span) {
     const double ratio = distance[static_cast<std::size_t>(span)] / tolerance;
     if (!(ratio > 1)) continue;
-    const int pieces = std::clamp(static_cast<int>(std::ceil(0.8 * std::sqrt(ratio))), 2, 4);
-    const double from = knots[span];
-    const double to = knots[span + 1];
-    for (int k = 1; k < pieces; ++k) {
-      const double t = from + (to - from) * k / pieces;
-      if (t > from && t < to) added.push_back(t);
+    for (int k = std::max(first, span - border); k <= std::min(last, span + border); ++k) {
+      int& count = pieces[static_cast<std::size_t>(k)];
+      if (length(k) >= length(span)) count = std::max(count, 2);
+    }
+    pieces[static_cast<std::size_t>(span)] =
+        std::clamp(static_cast<int>(std::ceil(0.8 * std::sqrt(ratio))), 2, 4);
+  }
+  std::vector<double> added;
+  for (int span = first; span <= last; ++span) {
+    const int count = pieces[static_cast<std::size_t>(span)];
+    for (int k = 1; k < count; ++k) {
+      const double t = knots[span] + length(span) * k / count;
+      if (t > knots[span] && t < knots[span + 1]) added.push_back(t);
     }
   }
   return added;
+}
+
+// None while estimates settle, then twice as far with every round.
+int border_width(int round) {
+  constexpr int kSettled = 8;
+  return round < kSettled ? 0 : 1 << std::min(round - kSettled, 20);
 }
 
 std::optional<Error> mesh_error(const KnotVector& knots, const MeshOptions& options,
@@ -131,7 +149,8 @@ Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
     const std::vector<double> distance =
         span_distances(at.knots(), {at.control_points().data(), 1, D});
     result.distance = largest(distance);
-    const std::vector<double> added = cuts(at.knots(), distance, options.tolerance);
+    const std::vector<double> added =
+        cuts(at.knots(), distance, options.tolerance, border_width(round));
     if (added.empty()) return result;
     const Eigen::Index count = at.control_points().cols() + static_cast<Eigen::Index>(added.size());
     if (count > options.most_control_points) {
@@ -166,9 +185,9 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
     if (result.distance <= options.tolerance) return result;
     const double half = 0.5 * options.tolerance;
     const std::vector<double> added_u =
-        cuts(at.u(), along_u, std::max(half, options.tolerance - worst_v));
+        cuts(at.u(), along_u, std::max(half, options.tolerance - worst_v), border_width(round));
     const std::vector<double> added_v =
-        cuts(at.v(), along_v, std::max(half, options.tolerance - worst_u));
+        cuts(at.v(), along_v, std::max(half, options.tolerance - worst_u), border_width(round));
     const Eigen::Index count = (at.u_count() + static_cast<Eigen::Index>(added_u.size())) *
                                (at.v_count() + static_cast<Eigen::Index>(added_v.size()));
     if (count > options.most_control_points) {

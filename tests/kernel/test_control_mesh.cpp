@@ -135,6 +135,27 @@ TEST(RefineToTolerance, PutsKnotsWhereTheCurveBendsAndBeatsUniformRefinement) {
   EXPECT_LT(3 * ours, uniform) << ours << " against " << uniform;
 }
 
+// Where long spans meet short ones the bound is larger than on either side.
+TEST(RefineToTolerance, EndsWhereTheBoundIsCloseToTheToleranceEverywhere) {
+  Random random(5);
+  for (int round = 0; round < 12; ++round) {
+    const KnotVector knots = KnotVector::clamped(2 + random.below(4), spaced(0, 1, 60));
+    const auto nodes = knots.greville();
+    const double pace = random.uniform(3, 9);
+    Eigen::Matrix3Xd points(3, knots.control_point_count());
+    for (int i = 0; i < points.cols(); ++i) {
+      const double t = nodes[static_cast<std::size_t>(i)];
+      points.col(i) << std::cos(pace * t), std::sin(pace * t), t * t;
+    }
+    MeshOptions options;
+    options.tolerance = 1e-4;
+    const auto refined = refine_to_tolerance(BSplineCurve<3>(knots, points), options);
+    ASSERT_TRUE(refined) << "round " << round << ": " << refined.error().message();
+    EXPECT_LE(refined->distance, options.tolerance);
+    EXPECT_LT(refined->curve.knots().control_point_count(), 4000);
+  }
+}
+
 TEST(RefineToTolerance, RefusesWhatItCannotDo) {
   Random random(4);
   const BSplineCurve<3> curve = random_curve<3>(random, KnotVector::clamped(3, {0, 1, 2}));
