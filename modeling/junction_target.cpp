@@ -21,7 +21,7 @@ constexpr double kRoundedStart = 0.25;
 // Pairs at this angle or less have the rounding asked for, at kWide or more 1 + kRounder times it.
 constexpr double kAcute = 30 * std::numbers::pi / 180;
 constexpr double kWide = 50 * std::numbers::pi / 180;
-constexpr double kRounder = 0.6;
+constexpr double kRounder = 0.8;
 // The crotch fills up by log 2 times the width: this leaves it within half a radius of the
 // cylinders.
 constexpr double kWidest = 0.6;

@@ -27,7 +27,7 @@ struct Setting {
   int sweeps = 60;
 };
 
-constexpr std::array<Setting, 10> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60},
+constexpr std::array<Setting, 13> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60},
                                            {1.5, 1.3, 0.5, 5.0, 0.5, 60},
                                            {1.5, 1.3, 0.5, 5.0, 0.0, 8},
                                            {1.0, 1.0, 1.5, 5.0, 0.5, 60},
@@ -36,7 +36,10 @@ constexpr std::array<Setting, 10> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60},
                                            {1.5, 1.5, 0.2, 10.0, 0.0, 60},
                                            {0.7, 1.0, 1.0, 2.0, 0.5, 30},
                                            {1.0, 1.5, 0.1, 5.0, 0.5, 60},
-                                           {2.0, 2.0, 0.5, 5.0, 0.0, 20}}};
+                                           {2.0, 2.0, 0.5, 5.0, 0.0, 20},
+                                           {1.5, 1.3, 1.5, 15.0, 0.5, 60},
+                                           {1.2, 1.2, 0.5, 15.0, 0.0, 30},
+                                           {0.8, 1.2, 1.5, 5.0, 0.0, 120}}};
 constexpr int kMoreTries = 3;  // for a fair surface that is sharper than its target
 
 struct Attempt {

@@ -147,6 +147,43 @@ TEST(MakeJunction, OfOrdinaryBranchesIsGentleAndNearItsCylinders) {
   EXPECT_LT(junction->worst_angle_deg, 1e-6);
 }
 
+// Every junction asked for the impossible is an error that names it; nothing is made up.
+TEST(MakeJunction, RefusesBadSpecsNamingTheJunctionAndTheBranch) {
+  const auto refuses = [](const JunctionSpec& spec, const std::string& what,
+                          const std::string& branch) {
+    const Result<Junction> junction = make_junction(spec);
+    ASSERT_FALSE(junction) << what;
+    EXPECT_EQ(junction.error().kind, ErrorKind::kBadInput) << what;
+    for (const std::string& word : {what, branch, std::string("junction 7")}) {
+      EXPECT_NE(junction.error().message().find(word), std::string::npos)
+          << word << " is not in: " << junction.error().message();
+    }
+  };
+  JunctionSpec spec = y_spec();
+  spec.branches[2].direction = spec.branches[0].direction;
+  refuses(spec, "same direction", "b0 and b2");
+  spec = y_spec();
+  spec.branches[1].radius_mm = -0.5;
+  refuses(spec, "-0.5", "b1");
+  spec = y_spec();
+  spec.branches[1].direction.setZero();
+  refuses(spec, "not a unit vector", "b1");
+  spec = y_spec();
+  spec.branches[2].longest_mm = -1;
+  refuses(spec, "longest distance", "b2");
+  spec = y_spec();
+  spec.center_mm.x() = std::numeric_limits<double>::infinity();
+  refuses(spec, "centre is not finite", "");
+  for (const std::size_t count : {0U, 1U, 2U}) {
+    spec = y_spec();
+    spec.branches.resize(count);
+    refuses(spec, "too few branches", "");
+  }
+  spec = y_spec();
+  while (spec.branches.size() < 25) spec.branches.push_back(spec.branches.back());
+  refuses(spec, "too many branches", "");
+}
+
 TEST(OpeningDistances, AreWhereTheOpeningsCome) {
   const JunctionSpec spec = y_spec();
   const auto distances = opening_distances_mm(spec);
