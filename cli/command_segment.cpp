@@ -1,12 +1,101 @@
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "cli/commands.h"
 #include "cli/console.h"
 #include "cli/figures.h"
+#include "io/xray_geometry_file.h"
+#include "recovery/multimodal.h"
 
 namespace angiospline::cli {
 
+namespace {
+
+// A grid over the same field of view with cubic voxels.
+ImageGrid world_grid(const ImageGrid& grid, double spacing_mm) {
+  ImageGrid world = grid;
+  world.spacing_mm = Vec3::Constant(spacing_mm);
+  for (std::size_t k = 0; k < 3; ++k)
+    world.size[k] = std::max(
+        1, static_cast<int>(std::lround(
+               grid.size[k] * grid.spacing_mm[static_cast<Eigen::Index>(k)] / spacing_mm)));
+  world.origin_mm = grid.world_mm(
+      Vec3(-0.5 * Vec3::Ones() + 0.5 * world.spacing_mm.cwiseQuotient(grid.spacing_mm)));
+  return world;
+}
+
+Image<float> in_float(const AnyImage& image) {
+  Image<float> out(grid_of(image));
+  std::visit(
+      [&](const auto& typed) {
+        std::transform(typed.voxels.begin(), typed.voxels.end(), out.voxels.begin(),
+                       [](auto v) { return static_cast<float>(v); });
+      },
+      image);
+  return out;
+}
+
+Result<MultimodalSegmentation> grow_with_views(const SegmentArguments& arguments,
+                                               const Progress& progress) {
+  if ((arguments.seeds_mm.empty() && arguments.seeds_vox.empty()) || !arguments.background)
+    return fail({ErrorKind::kBadInput,
+                 "growing with X-ray views needs more",
+                 arguments.xray,
+                 {},
+                 "give --seed and --background"});
+  auto views = read_xray_views(arguments.xray);
+  if (!views) return fail(views.error());
+  const auto file = read_image(arguments.image, {}, progress);
+  if (!file) return fail(file.error());
+  const ImageGrid& grid = grid_of(file->image);
+  MultimodalOptions options;
+  options.volume.polarity = arguments.dark ? Polarity::kDark : Polarity::kBright;
+  options.volume.neighbourhood_vox =
+      arguments.neighborhood.value_or(options.volume.neighbourhood_vox);
+  options.volume.deviations = arguments.deviations.value_or(options.volume.deviations);
+  options.projection = options.volume;
+  options.volume.background = arguments.background;
+  if (arguments.limit) options.max_examined = static_cast<std::size_t>(*arguments.limit);
+  std::vector<Vec3> seeds = arguments.seeds_mm;
+  for (const Vec3& seed : arguments.seeds_vox) seeds.push_back(grid.world_mm(seed));
+  const double edge = arguments.world_spacing_mm.value_or(0.5 * grid.spacing_mm.minCoeff());
+  Modalities images{in_float(file->image), std::move(*views)};
+  return grow_region(std::move(images), world_grid(grid, edge), seeds, options, progress);
+}
+
+int segment_with_views(const SegmentArguments& arguments) {
+  const Console console;
+  Stopwatch watch;
+  const auto grown = grow_with_views(arguments, console.progress());
+  if (!grown) return report_error(grown.error());
+  watch.lap("segment");
+  if (const auto written = write_image(grown->mask, arguments.output); !written) {
+    return report_error(written.error());
+  }
+  watch.lap("write");
+  const MultimodalReport& report = grown->report;
+  if (arguments.json) {
+    print_json({{"voxels", report.voxels},
+                {"examined", report.examined},
+                {"by_volume", report.by_volume},
+                {"by_views", report.by_views},
+                {"by_both", report.by_both},
+                {"limit_reached", report.limit_reached},
+                {"seconds", seconds_json(watch)}});
+  }
+  console.say(fmt::format(
+      "{} vessel voxels: {} by both modalities, {} by the volume alone, {} by "
+      "the views alone -> {}",
+      report.voxels, report.by_both, report.by_volume, report.by_views, arguments.output));
+  return kSuccess;
+}
+
+}  // namespace
+
 int run_segment(const SegmentArguments& arguments) {
+  if (!arguments.xray.empty()) return segment_with_views(arguments);
   const Console console;
   Stopwatch watch;
   const auto segmented = segment_image(arguments, console.progress(), watch);

@@ -29,6 +29,8 @@ struct SegmentArguments {
   std::optional<double> background;  // grey values beyond it are never vessel
   std::optional<double> smoothing_vox;
   std::optional<std::int64_t> limit;  // voxels examined
+  std::string xray;                   // views and their geometry, for growing in several modalities
+  std::optional<double> world_spacing_mm;
   std::string output;
   bool json = false;
 };

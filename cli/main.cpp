@@ -162,6 +162,13 @@ void add_segment(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("segment", "grow the vessel from seeds: image to mask");
   add_segment_options(command, line.segment);
   command->add_option("-o,--output", line.segment.output, "mask image to write")->required();
+  command->add_option("--xray", line.segment.xray,
+                      "JSON file of X-ray views: growing in IMAGE and all of them together; needs "
+                      "--seed and --background");
+  command
+      ->add_option("--world-spacing", line.segment.world_spacing_mm,
+                   "voxel edge of the mask in mm, with --xray (default: half of IMAGE's)")
+      ->check(CLI::PositiveNumber);
   add_json_flag(command, line.segment.json);
   command->callback([&line] { line.verb = [&line] { return run_segment(line.segment); }; });
 }

@@ -82,6 +82,40 @@ TEST_F(Masks, CompareMasksRefusesGridsOfDifferentSize) {
   EXPECT_NE(run.err.find("128x128x128 and 64x64x64"), std::string::npos) << run.err;
 }
 
+// A bar along y that fades in its middle: the volume alone stops there, two X-ray views go on.
+TEST_F(Masks, SegmentGrowsThroughAGapWithXrayViews) {
+  std::string volume, view;
+  for (int z = 0; z < 24; ++z)
+    for (int y = 0; y < 24; ++y)
+      for (int x = 0; x < 24; ++x) {
+        const bool bar = (x - 11.5) * (x - 11.5) + (z - 11.5) * (z - 11.5) <= 9.5;
+        volume.push_back(static_cast<char>(!bar ? 20 : y >= 10 && y <= 13 ? 100 : 120));
+      }
+  for (int row = 0; row < 65; ++row)
+    for (int column = 0; column < 65; ++column)
+      view.push_back(static_cast<char>(std::abs(column - 32) <= 4 ? 120 : 10));
+  const auto mha = [](const char* size, int dimensions) {
+    return std::string("ObjectType = Image\nNDims = ") + std::to_string(dimensions) +
+           "\nDimSize = " + size + "\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+  };
+  folder_.write("volume.mha", mha("24 24 24", 3) + volume);
+  folder_.write("view.mha", mha("65 65", 2) + view);
+  const std::string arm = R"("image": "view.mha", "centre_mm": [11.5, 11.5, 11.5],
+      "source_to_centre_mm": 750, "source_to_detector_mm": 1000, "pixel_mm": 1)";
+  folder_.write("views.json", R"({"schema": 1, "views": [{"angle_deg": 0, )" + arm +
+                                  R"(}, {"angle_deg": 90, )" + arm + "}]}");
+  const json j = figures({"segment", folder_ / "volume.mha", "--xray", folder_ / "views.json",
+                          "--seed", "11,3,11", "--background", "50", "--world-spacing", "1", "-o",
+                          folder_ / "mask.nrrd", "--json"});
+  EXPECT_GT(j["by_views"], 50);
+  EXPECT_GT(j["voxels"], 550);  // 24 slices of 32 voxels; without the views ten slices
+  EXPECT_LT(j["voxels"], 900);
+  const ProgramRun run = run_angiospline({"segment", folder_ / "volume.mha", "--xray",
+                                          folder_ / "views.json", "-o", folder_ / "m.nrrd"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_NE(run.err.find("--background"), std::string::npos) << run.err;
+}
+
 TEST_F(Masks, GraphWritesEveryFormatAndTheThesisTable) {
   make("bifurcation");
   const ProgramRun run =
