@@ -115,8 +115,9 @@ TEST(Reproduce, UnknownTablesAreNamedWithTheKnownOnes) {
   const auto table = reproduce_table("8.1");
   ASSERT_FALSE(table);
   EXPECT_NE(table.error().message().find("8.1"), std::string::npos);
-  EXPECT_NE(table.error().message().find("bifurcation"), std::string::npos);
-  EXPECT_EQ(reproducible_tables().size(), 10U);
+  for (const std::string& known : reproducible_tables()) {
+    EXPECT_NE(table.error().message().find(known), std::string::npos) << known;
+  }
 }
 
 }  // namespace
