@@ -107,6 +107,8 @@ void add_recover(CLI::App& app, CommandLine& line) {
       ->required();
   add_root_option(command, line.recover.root_mm);
   add_cut_option(command, line.recover.cut_contacts);
+  command->add_flag("!--no-fit", line.recover.fit,
+                    "keep the walls of the mask; do not fit them to the image");
   add_json_flag(command, line.recover.json);
   command->callback([&line] { line.verb = [&line] { return run_recover(line.recover); }; });
 }
