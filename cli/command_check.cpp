@@ -1,3 +1,5 @@
+#include <optional>
+
 #include <fmt/format.h>
 
 #include "cli/commands.h"
@@ -24,6 +26,15 @@ Result<Certificate> certify_any(const AnyModel& any, const std::string& file,
                "give a native model, STEP, IGES or BREP"});
 }
 
+// A native model against its own tree, smoothed as seeding would.
+std::optional<Fidelity> fidelity_of(const AnyModel& any, const Progress& progress) {
+  const auto* model = std::get_if<Model>(&any);
+  if (model == nullptr || model->tree.branches.empty()) return std::nullopt;
+  const auto smoothed = smooth_centerlines(model->tree, {}, progress);
+  if (!smoothed) return std::nullopt;
+  return measure_fidelity(model->network, *smoothed);
+}
+
 }  // namespace
 
 int run_check(const CheckArguments& arguments) {
@@ -32,12 +43,16 @@ int run_check(const CheckArguments& arguments) {
   if (!any) return report_error(any.error());
   const auto certificate = certify_any(*any, arguments.model, console.progress());
   if (!certificate) return report_error(certificate.error());
+  const auto fidelity = fidelity_of(*any, console.progress());
   console.finish_line();
   for (const std::string& text : certificate->warnings) console.warn(text);
   if (arguments.json) {
-    print_json(to_json(*certificate));
+    Json json = to_json(*certificate);
+    if (fidelity) json["fidelity"] = fidelity_json(*fidelity);
+    print_json(json);
   } else {
     fmt::print("{}", to_text(*certificate));
+    if (fidelity && fidelity->sections > 0) fmt::print("{}\n", to_text(*fidelity));
   }
   return kSuccess;
 }

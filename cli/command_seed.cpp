@@ -1,6 +1,7 @@
 #include <filesystem>
+#include <optional>
 
-#include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include "cli/commands.h"
 #include "cli/console.h"
@@ -8,11 +9,29 @@
 #include "cli/model_stages.h"
 #include "io/centerline_file.h"
 #include "io/certificate_json.h"
+#include "modeling/fidelity.h"
 
 namespace angiospline::cli {
 
+namespace {
+
+// One output without a model's suffix, or with a folder of that name: a folder for many trees.
+bool wants_batch(const SeedArguments& arguments) {
+  if (arguments.outputs.size() != 1) return false;
+  const std::filesystem::path target = arguments.outputs.front();
+  return !target.has_extension() || std::filesystem::is_directory(target);
+}
+
+}  // namespace
+
 int run_seed(const SeedArguments& arguments) {
+  if (wants_batch(arguments)) return run_seed_batch(arguments);
   const Console console;
+  std::optional<tbb::global_control> threads;
+  if (arguments.threads > 0) {
+    threads.emplace(tbb::global_control::max_allowed_parallelism,
+                    static_cast<std::size_t>(arguments.threads));
+  }
   Stopwatch watch;
   const std::vector<std::filesystem::path> paths(arguments.outputs.begin(),
                                                  arguments.outputs.end());
@@ -23,24 +42,37 @@ int run_seed(const SeedArguments& arguments) {
   }
   const auto reading = centerline_options(arguments.reading);
   if (!reading) return report_error(reading.error());
-  const auto tree = read_centerline_file(arguments.tree, *reading);
+  const auto tree = read_centerline_files(
+      std::vector<std::filesystem::path>(arguments.trees.begin(), arguments.trees.end()), *reading);
   if (!tree) return report_error(tree.error());
   watch.lap("read");
 
-  auto model = seed_model(*tree, {}, console.progress());
+  SeedOptions options;
+  options.extend_inlets = arguments.extend_inlets;
+  options.extend_outlets = arguments.extend_outlets;
+  options.clearance = arguments.clearance;
+  const auto smoothed = smooth_for_seed(*tree, options, console.progress());
+  if (!smoothed) return report_error(smoothed.error());
+  watch.lap("smooth");
+  auto model = seed_smoothed(*smoothed, options, console.progress());
   if (!model) return report_error(model.error());
-  model->name = arguments.name.empty() ? std::filesystem::path(arguments.tree).stem().string()
-                                       : arguments.name;
+  model->name = arguments.name.empty()
+                    ? std::filesystem::path(arguments.trees.front()).stem().string()
+                    : arguments.name;
   watch.lap("model");
+  const Fidelity fidelity = measure_fidelity(model->network, *smoothed);
+  watch.lap("fidelity");
   const auto finished = finish_model(*model, paths, arguments.step_schema, console, watch);
   if (!finished) return report_error(finished.error());
   if (arguments.json) {
     Json json = model_json(*model);
     json["seconds"] = seconds_json(watch);
     json["files"] = arguments.outputs;
+    json["fidelity"] = fidelity_json(fidelity);
     json["check"] = to_json(*finished);
     print_json(json);
   }
+  console.say(to_text(fidelity));
   return tell_outcome(*model, *finished, arguments.outputs, console);
 }
 

@@ -36,9 +36,15 @@ struct SegmentArguments {
 };
 
 struct SeedArguments {
-  std::string tree;
+  std::vector<std::string> trees;  // files, folders, or lists of them
   CenterlineArguments reading;
-  std::vector<std::string> outputs;
+  std::vector<std::string> outputs;  // model files of one tree, or one folder for many
+  std::string formats = "step";      // of many trees: suffixes with commas between
+  int jobs = 0;                      // trees at a time; 0: as many as there are processors
+  int threads = 0;                   // of one tree; 0: as many as there are processors
+  double extend_inlets = 0.0;        // in diameters
+  double extend_outlets = 0.0;
+  std::optional<double> clearance;  // in radii of the thinner vessel
   std::string name;
   std::string step_schema = "AP242";
   bool json = false;
@@ -137,6 +143,7 @@ struct ReproduceArguments {
 int run_recover(const RecoverArguments& arguments);
 int run_fit(const FitArguments& arguments);
 int run_seed(const SeedArguments& arguments);
+int run_seed_batch(const SeedArguments& arguments);
 int run_segment(const SegmentArguments& arguments);
 int run_thin(const ThinArguments& arguments);
 int run_graph(const GraphArguments& arguments);

@@ -101,6 +101,25 @@ Json model_json(const Model& model) {
           {"assumptions", model.assumptions},        {"warnings", model.warnings}};
 }
 
+Json fidelity_json(const Fidelity& f) {
+  return {{"sections", f.sections},
+          {"near_junctions", f.near_junctions},
+          {"missed", f.missed},
+          {"mean_radius_error", f.mean_radius_error},
+          {"largest_radius_error", f.largest_radius_error},
+          {"sections_beyond_5_percent", f.far_off},
+          {"largest_radius_error_branch", f.largest_error_branch},
+          {"largest_radius_error_at_mm", to_json(f.largest_error_at_mm)},
+          {"largest_radius_error_near_junctions", f.largest_radius_error_near_junctions},
+          {"mean_axis_offset_radii", f.mean_axis_offset},
+          {"largest_axis_offset_radii", f.largest_axis_offset},
+          {"largest_axis_offset_branch", f.largest_offset_branch},
+          {"mean_smoothing_move_radii", f.mean_move_radii},
+          {"largest_smoothing_move_radii", f.largest_move_radii},
+          {"largest_smoothing_move_mm", f.largest_move_mm},
+          {"largest_smoothing_move_branch", f.largest_move_branch}};
+}
+
 void print_json(const Json& json) { fmt::print("{}\n", json.dump(1, ' ')); }
 
 }  // namespace angiospline::cli

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/stages.h"
+#include "modeling/fidelity.h"
 #include "modeling/model.h"
 
 namespace angiospline::cli {
@@ -18,6 +19,10 @@ Json contacts_json(const Vessels& vessels);
 
 // branches, junctions, loops, failed, assumptions, warnings: what seed and recover share.
 Json model_json(const Model& model);
+
+// sections, mean_radius_error, largest_radius_error (away from junctions, parts of the radius) and
+// its branch; axis offsets and what smoothing moved, in radii and mm.
+Json fidelity_json(const Fidelity& fidelity);
 
 // One line on standard output.
 void print_json(const Json& json);

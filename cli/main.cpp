@@ -116,12 +116,34 @@ void add_recover(CLI::App& app, CommandLine& line) {
 void add_seed(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("seed", "from a centerline+radius file to a CAD model");
   SeedArguments& a = line.seed;
-  command->add_option("TREE", a.tree, "centerline file: .swc .csv ...")->required();
+  command
+      ->add_option("TREE", a.trees,
+                   "centerline file (.swc .csv ...); several .ctgr and .pth are one tree; with a "
+                   "folder as output: any number of files, folders of them, and lists (.list)")
+      ->required();
   command
       ->add_option(
           "-o,--output", a.outputs,
-          "files to write, by suffix: .step .iges .brep .glb .stl .vtp .vtu .json .html .geo")
+          "files to write, by suffix: .step .iges .brep .glb .stl .vtp .vtu .json .html .geo; or "
+          "one folder, which gets the models of all trees and summary.csv and summary.json")
       ->required();
+  command
+      ->add_option("--extend-inlets", a.extend_inlets,
+                   "straight round tube added at each inlet, in diameters")
+      ->check(CLI::Range(0.0, 1e3));
+  command->add_option("--extend-outlets", a.extend_outlets, "the same at each outlet")
+      ->check(CLI::Range(0.0, 1e3));
+  command
+      ->add_option(
+          "--clearance", a.clearance,
+          "move apart and thin vessels that come nearer than this, in radii of the thinner")
+      ->check(CLI::Range(0.0, 10.0));
+  command->add_option("--format", a.formats,
+                      "into a folder: what to write of each tree, as in step,glb,json");
+  command->add_option("--jobs", a.jobs, "into a folder: trees at a time (default: one a processor)")
+      ->check(CLI::Range(1, 1024));
+  command->add_option("--threads", a.threads, "processors used for one tree (default: all)")
+      ->check(CLI::Range(1, 1024));
   command->add_option("--unit", a.reading.unit, "unit of the file: mm, cm, m or um")
       ->check(CLI::IsMember({"mm", "cm", "m", "um"}));
   command->add_flag("--radius-is-diameter", a.reading.radius_is_diameter,

@@ -102,7 +102,61 @@ Result<CenterlineTree> read_folder(const std::filesystem::path& path,
                "a folder holds vertices.csv and edges.csv, or .ctgr and .pth files"});
 }
 
+bool holds_simvascular(const std::filesystem::path& folder) {
+  std::error_code code;
+  const std::filesystem::directory_iterator entries(folder, code);
+  return std::any_of(begin(entries), end(entries), [](const auto& entry) {
+    return lower_case(entry.path().extension().string()) == ".ctgr";
+  });
+}
+
+bool has_known_suffix(const std::filesystem::path& path) {
+  const std::string suffix = lower_case(path.extension().string());
+  return std::any_of(kFormats.begin(), kFormats.end(),
+                     [&](const Format& f) { return f.suffix == suffix; });
+}
+
 }  // namespace
+
+Result<std::vector<std::filesystem::path>> centerline_files_in(
+    const std::filesystem::path& folder) {
+  std::error_code code;
+  std::filesystem::directory_iterator entries(folder, code);
+  if (code) {
+    return fail({ErrorKind::kBadInput, "the folder cannot be read", folder.string(), {}, {}});
+  }
+  std::vector<std::filesystem::path> trees;
+  if (holds_simvascular(folder)) trees.push_back(folder);
+  for (const auto& entry : entries) {
+    const std::filesystem::path& path = entry.path();
+    const bool is_tree = entry.is_directory(code) ? holds_simvascular(path)
+                                                  : has_known_suffix(path) &&
+                                                        !partner_of(path, kEdgeWords, kVertexWords);
+    if (is_tree) trees.push_back(path);
+  }
+  std::sort(trees.begin(), trees.end());
+  return trees;
+}
+
+std::vector<std::filesystem::path> files_of_tree(const std::filesystem::path& path) {
+  std::error_code code;
+  std::vector<std::filesystem::path> files;
+  const bool is_folder = std::filesystem::is_directory(path, code);
+  if (!is_folder) files.push_back(path);
+  if (is_folder || is_simvascular(path)) {
+    const std::filesystem::path beside = path.has_parent_path() ? path.parent_path() : ".";
+    for (const auto& entry : std::filesystem::directory_iterator(is_folder ? path : beside, code)) {
+      const bool is_part = is_folder ? entry.is_regular_file(code)
+                                     : is_simvascular(entry.path()) && entry.path() != path &&
+                                           entry.path().stem() == path.stem();
+      if (is_part) files.push_back(entry.path());
+    }
+  }
+  if (const auto edges = partner_of(path, kVertexWords, kEdgeWords)) files.push_back(*edges);
+  if (const auto vertices = partner_of(path, kEdgeWords, kVertexWords)) files.push_back(*vertices);
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
 Result<CenterlineTree> read_centerline_file(const std::filesystem::path& path,
                                             const CenterlineFileOptions& options) {

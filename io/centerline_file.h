@@ -43,6 +43,14 @@ struct CenterlineFileOptions {
 Result<CenterlineTree> read_centerline_file(const std::filesystem::path& path,
                                             const CenterlineFileOptions& options = {});
 
+// The trees in a folder, in the order of their names: every file with a suffix from above that is
+// not the other table of a pair; the folder itself where it holds one tree's SimVascular files; and
+// folders in it that do. Errors: not a folder.
+Result<std::vector<std::filesystem::path>> centerline_files_in(const std::filesystem::path& folder);
+
+// Every file that reading `path` may open, sorted: itself, and those it may find beside it.
+std::vector<std::filesystem::path> files_of_tree(const std::filesystem::path& path);
+
 // One tree from several files: SimVascular's vessels. A single path is read as above.
 Result<CenterlineTree> read_centerline_files(const std::vector<std::filesystem::path>& paths,
                                              const CenterlineFileOptions& options = {});

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
+#include "modeling/lead_in.h"
 #include "modeling/spline_fit.h"
 
 namespace angiospline {
@@ -19,6 +21,13 @@ constexpr double kStiff = 4.0;   // near held ends: a turn by delta bends by abo
 constexpr double kFirstStep = 0.0125;
 constexpr int kRounds = 24;  // of stiffening bends that are too tight
 constexpr double kSpansPerRadius = 1.5;
+constexpr double kNearEnd = 5.0;      // radii within which a bend is the end's
+constexpr double kLeadBend = 0.65;    // that a lead-in should keep, so that the fit to it has room
+constexpr double kNearTarget = 10.0;  // radii of way within which a point finds its place again
+constexpr double kThroat =
+    kMostNarrowed;                 // of the radius given up: the wall is likely to fold there
+constexpr double kFoldCost = 1e3;  // worse than any departure
+constexpr double kLargestDeparture = 2.0;  // radii as bad as giving up kMostNarrowed of the radius
 
 struct Rail {
   std::vector<double> parameters;  // of the target's columns, arc length over total length
@@ -27,23 +36,29 @@ struct Rail {
   double mean_radius_mm = 0.0;
 };
 
-// Parameters by arc length, the ends' own points included.
-Rail make_rail(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end) {
+// Parameters by arc length.
+Rail rail_through(Eigen::Matrix4Xd points) {
   Rail rail;
-  rail.points.resize(4, target.cols() + 2);
-  rail.points.col(0) << start.point_mm, start.radius_mm;
-  rail.points.middleCols(1, target.cols()) = target;
-  rail.points.rightCols<1>() << end.point_mm, end.radius_mm;
   double along = 0;
-  for (Eigen::Index i = 0; i < rail.points.cols(); ++i) {
-    if (i > 0) along += (rail.points.col(i) - rail.points.col(i - 1)).head<3>().norm();
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    if (i > 0) along += (points.col(i) - points.col(i - 1)).head<3>().norm();
     rail.parameters.push_back(along);
   }
   EXPECTS(along > 0);
   for (double& t : rail.parameters) t = std::min(1.0, t / along);
   rail.length_mm = along;
-  rail.mean_radius_mm = rail.points.row(3).mean();
+  rail.mean_radius_mm = points.row(3).mean();
+  rail.points = std::move(points);
   return rail;
+}
+
+// The target with the ends' own points.
+Rail make_rail(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end) {
+  Eigen::Matrix4Xd points(4, target.cols() + 2);
+  points.col(0) << start.point_mm, start.radius_mm;
+  points.middleCols(1, target.cols()) = target;
+  points.rightCols<1>() << end.point_mm, end.radius_mm;
+  return rail_through(std::move(points));
 }
 
 // Even samples of the rail: every span of the spline sees the same number of them.
@@ -95,16 +110,46 @@ Bend bend_at(const BSplineCurve<4>& curve, double t) {
 class PathFit {
  public:
   PathFit(Rail rail, const PathEnd& start, const PathEnd& end, double largest_move)
-      : rail_(std::move(rail)),
+      : rail_(rail),
+        target_(std::move(rail)),
         start_(start),
         end_(end),
         largest_move_(largest_move),
         knots_(make_knots()),
         course_(knots_, Eigen::Matrix4Xd::Zero(4, knots_.control_point_count())) {
-    const std::size_t spans = knots_.breakpoints().size() - 1;
-    stiffness_.assign(spans, kSlack);
-    resample(rail_, 4 * static_cast<int>(spans) + 4);
-    course_ = solve();
+    prepare();
+  }
+
+  // Where the path would bend too tightly near an end, the target is led in from there.
+  void lead_in() {
+    const double near = kNearEnd * rail_.mean_radius_mm / rail_.length_mm;
+    const bool at_first = !start_.direction.isZero() && tightest_within(0, near) > kTightestBend;
+    const bool at_last = !end_.direction.isZero() && tightest_within(1 - near, 1) > kTightestBend;
+    if (!at_first && !at_last) return;
+    const double most = at_first && at_last ? 0.45 : 0.9;
+    const BSplineCurve<4> course = target_spline();
+    std::optional<LeadIn> first, last;
+    if (at_first) first = find_lead_in(course, false, start_, kLeadBend, most);
+    if (at_last) last = find_lead_in(course, true, end_, kLeadBend, most);
+    const double from = first ? first->joins_at : 0;
+    const double to = last ? 1 - last->joins_at : 1;
+    std::vector<Vec4> points;
+    if (first) {
+      for (const auto& p : first->samples.colwise()) points.emplace_back(p);
+    }
+    for (std::size_t i = 0; i < rail_.parameters.size(); ++i) {
+      const double t = rail_.parameters[i];
+      if (t >= from && t <= to) points.emplace_back(rail_.points.col(static_cast<Eigen::Index>(i)));
+    }
+    if (last) {
+      for (Eigen::Index i = last->samples.cols(); i-- > 0;) {
+        points.emplace_back(last->samples.col(i));
+      }
+    }
+    rail_ = rail_through(Eigen::Map<Eigen::Matrix4Xd>(points.front().data(), 4,
+                                                      static_cast<Eigen::Index>(points.size())));
+    knots_ = make_knots();
+    prepare();
   }
 
   const BSplineCurve<4>& course() const { return course_; }
@@ -116,15 +161,9 @@ class PathFit {
     const Eigen::MatrixXd first = held_rows(start_, reach);
     const Eigen::MatrixXd last = held_rows(end_, -reach).colwise().reverse();
 
-    SplineFitProblem problem;
-    problem.parameters = rail_.parameters;
-    problem.values = rail_.points.transpose();
-    const double stretch = rail_.mean_radius_mm / rail_.length_mm;  // one radius in the parameter
-    const double share = 1.0 / static_cast<double>(rail_.parameters.size());
-    problem.weights.assign(rail_.parameters.size(), share / stretch);
-    problem.bending = scaled(stiffness_, stretch, kSlack);
-    const Eigen::MatrixXd target = fit_spline(knots_, problem);
-
+    const Eigen::MatrixXd target = target_spline().control_points().transpose();
+    SplineFitProblem problem = target_problem();
+    const double stretch = rail_.mean_radius_mm / rail_.length_mm;
     problem.values.setZero();
     problem.bending = scaled(stiffness_, stretch, kStiff);
     problem.first = first - target.topRows(first.rows());
@@ -160,9 +199,47 @@ class PathFit {
     return any;
   }
 
+  // Of the target as it was given.
+  AxisDeparture departure(const BSplineCurve<4>& curve) const {
+    return departure_from(curve, target_.points, target_.parameters);
+  }
+
   double spans() const { return static_cast<double>(stiffness_.size()); }
 
  private:
+  void prepare() {
+    const std::size_t spans = knots_.breakpoints().size() - 1;
+    stiffness_.assign(spans, kSlack);
+    resample(rail_, 4 * static_cast<int>(spans) + 4);
+    course_ = solve();
+  }
+
+  // The target as it is, stiffened where bends ask for it, and free at its ends.
+  SplineFitProblem target_problem() const {
+    SplineFitProblem problem;
+    problem.parameters = rail_.parameters;
+    problem.values = rail_.points.transpose();
+    const double stretch = rail_.mean_radius_mm / rail_.length_mm;  // one radius in the parameter
+    const double share = 1.0 / static_cast<double>(rail_.parameters.size());
+    problem.weights.assign(rail_.parameters.size(), share / stretch);
+    problem.bending = scaled(stiffness_, stretch, kSlack);
+    return problem;
+  }
+  BSplineCurve<4> target_spline() const {
+    return BSplineCurve<4>(knots_, fit_spline(knots_, target_problem()).transpose());
+  }
+
+  double tightest_within(double from, double to) const {
+    constexpr int kSteps = 64;
+    double largest = 0;
+    for (int i = 0; i <= kSteps; ++i) {
+      const double t = std::clamp(from + (to - from) * i / kSteps, 0.0, 1.0);
+      const Bend bend = bend_at(course_, t);
+      largest = std::max(largest, bend.curvature * bend.radius);
+    }
+    return largest;
+  }
+
   // The spans near which the curve lies farther from its unstiffened course than it may.
   std::vector<char> moved_spans(const BSplineCurve<4>& curve) const {
     std::vector<char> moved(stiffness_.size(), 0);
@@ -195,6 +272,7 @@ class PathFit {
   }
 
   Rail rail_;
+  Rail target_;  // as given, before it was led in or resampled
   PathEnd start_;
   PathEnd end_;
   double largest_move_;
@@ -231,35 +309,81 @@ double tightest(const std::vector<Bend>& bends) {
   return largest;
 }
 
-BodyPath fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end,
-                    double largest_move) {
-  PathFit fit(rail, start, end, largest_move);
+struct Attempt {
+  BodyPath path;
+  double cost = 0.0;  // 1: as much as should be given up of the radius, or of the centerline
+};
+
+// What may be tried: to lead the target in, and how far stiffening may move the path.
+struct Leave {
+  bool lead_in;
+  double largest_move;
+};
+
+constexpr Leave kAnyMove{false, std::numeric_limits<double>::infinity()};
+
+Attempt fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end, const Leave& leave) {
+  PathFit fit(rail, start, end, leave.largest_move);
+  if (leave.lead_in) fit.lead_in();
   BSplineCurve<4> curve = fit.course();
   for (int round = 0; round < kRounds && fit.stiffen(curve); ++round) curve = fit.solve();
 
   const int samples = static_cast<int>(4 * fit.spans());
   std::vector<Bend> bends = bends_of(curve, samples);
-  BodyPath path{curve, tightest(bends), 0.0};
-  if (path.largest_bend <= kTightestBend) return path;
+  Attempt attempt{{curve, tightest(bends), 0.0}, fit.departure(curve).radii / kLargestDeparture};
+  BodyPath& path = attempt.path;
+  if (path.largest_bend <= kTightestBend) return attempt;
   path.curve = narrow(curve, bends);
   for (const Bend& before : bends) {
     path.narrowed = std::max(path.narrowed, 1 - path.curve.at(before.parameter)(3) / before.radius);
   }
   path.largest_bend = tightest(bends_of(path.curve, samples));
-  return path;
+  attempt.cost = std::max(attempt.cost, path.narrowed / kMostNarrowed);
+  if (path.narrowed > kThroat && !std::isinf(leave.largest_move)) attempt.cost += kFoldCost;
+  return attempt;
 }
 
 }  // namespace
 
-BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end) {
+BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end,
+                       PathFreedom freedom) {
   EXPECTS(target.cols() >= 2);
   EXPECTS(start.radius_mm > 0 && end.radius_mm > 0);
   const Rail rail = make_rail(target, start, end);
-  for (const double largest_move : {kLargestPathMove, 1.0}) {
-    BodyPath path = fit_within(rail, start, end, largest_move);
-    if (path.narrowed <= kMostNarrowed) return path;
+  std::optional<Attempt> best;
+  for (const Leave& leave : {Leave{false, kLargestPathMove}, Leave{false, 1.0},
+                             Leave{true, kLargestPathMove}, Leave{true, 1.0}, kAnyMove}) {
+    if (freedom == PathFreedom::kAnyMove && !std::isinf(leave.largest_move)) continue;
+    Attempt attempt = fit_within(rail, start, end, leave);
+    if (!best || attempt.cost < best->cost) best = std::move(attempt);
+    if (best->cost <= 1) break;
   }
-  return fit_within(rail, start, end, std::numeric_limits<double>::infinity());
+  return std::move(best->path);
+}
+
+AxisDeparture departure_from(const BSplineCurve<4>& curve, const Eigen::Matrix4Xd& points,
+                             const std::vector<double>& parameters) {
+  EXPECTS(static_cast<Eigen::Index>(parameters.size()) == points.cols());
+  const int count = 8 * curve.knots().control_point_count();
+  std::vector<Vec4> axis;
+  double length = 0;
+  for (int k = 0; k <= count; ++k) {
+    axis.push_back(curve.at(static_cast<double>(k) / count));
+    if (k > 0) length += (axis.back() - axis[axis.size() - 2]).head<3>().norm();
+  }
+  AxisDeparture worst;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const Vec4 place = points.col(static_cast<Eigen::Index>(i));
+    const int here = static_cast<int>(parameters[i] * count);
+    const int window = static_cast<int>(std::ceil(kNearTarget * place(3) / length * count));
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int k = std::max(0, here - window); k <= std::min(count, here + window); ++k) {
+      const Vec3 at = axis[static_cast<std::size_t>(k)].head<3>();
+      nearest = std::min(nearest, (place.head<3>() - at).norm());
+    }
+    if (nearest > worst.mm) worst = {nearest, nearest / place(3)};
+  }
+  return worst;
 }
 
 }  // namespace angiospline

@@ -1,6 +1,8 @@
 // The curve a body is swept along: the smoothed centerline, bent so that it meets its two ends.
 #pragma once
 
+#include <vector>
+
 #include "base/vector.h"
 #include "kernel/curve.h"
 
@@ -23,17 +25,30 @@ struct BodyPath {
 // Bends tighter than this (curvature times radius) are relaxed; 1 is where a tube folds.
 inline constexpr double kTightestBend = 0.75;
 
-// Stiffening may move the path by so many radii, unless the radius would be narrowed by more than
-// the share below: then by one radius, then by as much as it takes.
+// Stiffening may move the path by so many radii. If that would narrow the radius by more than the
+// share below, or leave the target by more than two radii, other ways are tried (one radius, then
+// ends led in, then any move), and the one that gives up least of either is taken.
 inline constexpr double kLargestPathMove = 0.3;
 inline constexpr double kMostNarrowed = 0.4;
 
 // Follows `target` (columns x, y, z, radius in mm; at least two, not all in one place) between the
 // ends. What the target misses at the ends is made up by an elastic correction that dies out within
-// some four radii; bends tighter than kTightestBend are stiffened until they open or the path has
-// moved by about kLargestPathMove radii. If a bend stays too tight the radius is narrowed there to
-// kTightestBend / curvature.
+// some four radii; bends tighter than kTightestBend are stiffened. Where the target turns away from
+// an end's direction too sharply even so, it is joined farther on (modeling/lead_in.h). If a bend
+// stays too tight the radius is narrowed there to kTightestBend / curvature.
 // Linear in the number of columns and in length / radius.
-BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end);
+// kAnyMove: only the last of these ways, for a wall that folds on every path nearer to the target.
+enum class PathFreedom { kNearTarget, kAnyMove };
+BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end,
+                       PathFreedom freedom = PathFreedom::kNearTarget);
+
+// The largest distance of points (columns x, y, z, radius) from the curve, in mm, and that in the
+// radius there. Each is looked for within ten radii of way from its own parameter in [0, 1].
+struct AxisDeparture {
+  double mm = 0.0;
+  double radii = 0.0;
+};
+AxisDeparture departure_from(const BSplineCurve<4>& curve, const Eigen::Matrix4Xd& points,
+                             const std::vector<double>& parameters);
 
 }  // namespace angiospline

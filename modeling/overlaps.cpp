@@ -175,8 +175,7 @@ std::vector<int> clusters(const SmoothedTree& tree) {
 struct Contact {
   int number_a;
   int number_b;
-  double depth;
-  Vec3 at;
+  VesselContact vessels;
 };
 
 // Contacts that hang together with an end of the branch, along it, are that end's junction.
@@ -197,7 +196,7 @@ std::vector<bool> beyond_junction(const std::vector<Contact>& contacts, int Cont
 
 }  // namespace
 
-std::vector<Overlap> find_overlaps(const SmoothedTree& tree, const OverlapOptions& options) {
+std::vector<VesselContact> find_contacts(const SmoothedTree& tree, const OverlapOptions& options) {
   const std::vector<Capsule> capsules = capsules_of(tree);
   std::vector<int> count(tree.paths.size(), 0);
   for (const Capsule& c : capsules) ++count[index(c.branch)];
@@ -214,11 +213,15 @@ std::vector<Overlap> find_overlaps(const SmoothedTree& tree, const OverlapOption
       const double depth =
           sum + options.clearance * std::min(p->radius, q->radius) - (u - v).norm();
       if (depth <= 0) return;
-      contacts[{p->branch, q->branch}].push_back({p->number, q->number, depth, 0.5 * (u + v)});
+      const auto along = [](const Capsule& c, const Vec3& at) {
+        return c.start_mm + (at - c.a).norm();
+      };
+      contacts[{p->branch, q->branch}].push_back(
+          {p->number, q->number, {p->branch, q->branch, along(*p, u), along(*q, v), u, v, depth}});
     });
   }
   const std::vector<int> cluster = clusters(tree);
-  std::vector<Overlap> overlaps;
+  std::vector<VesselContact> result;
   for (const auto& [pair, found] : contacts) {
     const CenterlineBranch& a = tree.tree.branches[index(pair.first)];
     const CenterlineBranch& b = tree.tree.branches[index(pair.second)];
@@ -235,13 +238,24 @@ std::vector<Overlap> find_overlaps(const SmoothedTree& tree, const OverlapOption
         same ? beyond_a
              : beyond_junction(found, &Contact::number_b, count[index(pair.second)],
                                meets(b.from, a), meets(b.to, a));
-    Overlap worst{pair.first, pair.second, Vec3::Zero(), 0.0};
     for (std::size_t k = 0; k < found.size(); ++k) {
-      if (!beyond_a[k] || !beyond_b[k] || found[k].depth <= worst.depth_mm) continue;
-      worst.depth_mm = found[k].depth;
-      worst.at_mm = found[k].at;
+      if (beyond_a[k] && beyond_b[k]) result.push_back(found[k].vessels);
     }
-    if (worst.depth_mm > 0) overlaps.push_back(worst);
+  }
+  return result;
+}
+
+std::vector<Overlap> find_overlaps(const SmoothedTree& tree, const OverlapOptions& options) {
+  std::vector<Overlap> overlaps;
+  for (const VesselContact& c : find_contacts(tree, options)) {  // ordered by pairs
+    if (overlaps.empty() || overlaps.back().first != c.first ||
+        overlaps.back().second != c.second) {
+      overlaps.push_back({c.first, c.second, Vec3::Zero(), 0.0});
+    }
+    Overlap& worst = overlaps.back();
+    if (c.depth_mm <= worst.depth_mm) continue;
+    worst.depth_mm = c.depth_mm;
+    worst.at_mm = 0.5 * (c.first_mm + c.second_mm);
   }
   return overlaps;
 }

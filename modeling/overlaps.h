@@ -28,6 +28,21 @@ struct OverlapOptions {
 // each octave of sizes.
 std::vector<Overlap> find_overlaps(const SmoothedTree& tree, const OverlapOptions& options = {});
 
+// One place where two vessels are nearer than they may be.
+struct VesselContact {
+  int first = -1;
+  int second = -1;
+  double first_along = 0.0;  // on their paths
+  double second_along = 0.0;
+  Vec3 first_mm = Vec3::Zero();  // on their centerlines
+  Vec3 second_mm = Vec3::Zero();
+  double depth_mm = 0.0;
+};
+
+// All pairs of capsules behind find_overlaps, ordered by pairs of branches.
+std::vector<VesselContact> find_contacts(const SmoothedTree& tree,
+                                         const OverlapOptions& options = {});
+
 // "branches 12_40 and 33_35 overlap by 0.41 mm near (1.2, 3.4, 5.6)".
 std::string overlap_text(const SmoothedTree& tree, const Overlap& overlap);
 

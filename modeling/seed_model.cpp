@@ -14,6 +14,7 @@
 #include "modeling/assembly.h"
 #include "modeling/body.h"
 #include "modeling/body_path.h"
+#include "modeling/keep_apart.h"
 #include "modeling/seed_plan.h"
 
 namespace angiospline {
@@ -294,8 +295,8 @@ class Seeder {
 
   Outcome build_body(int b) const {
     const PlannedBranch& branch = plan_.branches()[index(b)];
-    const Stop start = stop_at(b, false);
-    const Stop end = stop_at(b, true);
+    Stop start = stop_at(b, false);
+    Stop end = stop_at(b, true);
     Outcome outcome;
     const double radius = (start.path.radius_mm + end.path.radius_mm) / 2;
     const bool capped =
@@ -313,8 +314,14 @@ class Seeder {
       }
       return outcome;
     }
+    if (auto added = extend(b, false, start)) outcome.pieces.push_back(std::move(*added));
+    if (auto added = extend(b, true, end)) outcome.pieces.push_back(std::move(*added));
     const Eigen::Matrix4Xd target = followed(branch, start, end);
     BodyPiece piece = sweep(target, start, end);
+    if (piece.body.jacobian_ratio < kFoldedBody) {
+      BodyPiece freer = sweep(target, start, end, PathFreedom::kAnyMove);
+      if (freer.body.jacobian_ratio > piece.body.jacobian_ratio) piece = std::move(freer);
+    }
     if (piece.body.jacobian_ratio < kFoldedBody && !capped) {
       // The ends are too near each other for a tube that bends: they are joined directly.
       Body loft = make_lofted_body(start.body, end.body);
@@ -337,7 +344,7 @@ class Seeder {
       outcome.warnings.push_back(fmt::format("the wall of branch {} folds (Jacobian ratio {:.2g})",
                                              branch.name, piece.body.jacobian_ratio));
     }
-    if (const Departure off = departure(branch, start, end, piece);
+    if (const AxisDeparture off = departure(branch, start, end, piece);
         off.radii > kFarFromCenterline) {
       outcome.warnings.push_back(fmt::format(
           "the axis of branch {} leaves its centerline by up to {:.3g} mm ({:.2g} radii)",
@@ -348,32 +355,47 @@ class Seeder {
     return outcome;
   }
 
-  struct Departure {
-    double mm = 0;
-    double radii = 0;
-  };
-
-  // How far samples of the branch lie from the body's axis; along both the search only goes
-  // forward.
-  static Departure departure(const PlannedBranch& branch, const Stop& start, const Stop& end,
-                             const BodyPiece& piece) {
-    Departure worst;
-    if (!piece.path) return worst;
-    const int count = 8 * piece.path->knots().control_point_count();
-    Points3 axis(3, count + 1);
-    for (int i = 0; i <= count; ++i) {
-      axis.col(i) = piece.path->at(static_cast<double>(i) / count).head<3>();
-    }
-    Eigen::Index at = 0;
+  // Of the axis from the branch between its stops.
+  static AxisDeparture departure(const PlannedBranch& branch, const Stop& start, const Stop& end,
+                                 const BodyPiece& piece) {
+    if (!piece.path) return {};
+    std::vector<Eigen::Index> columns;
+    std::vector<double> parameters;
     for (Eigen::Index i = 0; i < branch.samples.cols(); ++i) {
       const double along = branch.along_mm[static_cast<std::size_t>(i)];
       if (along < start.along || along > end.along) continue;
-      const Vec3 place = branch.samples.col(i).head<3>();
-      const auto away = [&](Eigen::Index k) { return (axis.col(k) - place).norm(); };
-      while (at < count && away(at + 1) <= away(at)) ++at;
-      if (away(at) > worst.mm) worst = {away(at), away(at) / branch.samples(3, i)};
+      columns.push_back(i);
+      parameters.push_back((along - start.along) / (end.along - start.along));
     }
-    return worst;
+    return departure_from(*piece.path, branch.samples(Eigen::all, columns), parameters);
+  }
+
+  // A free end that is to be extended becomes a circle that the body shares with its extension.
+  std::optional<BodyPiece> extend(int b, bool at_end, Stop& stop) const {
+    if (stop.link.kind != BodyLink::Kind::kRim) return std::nullopt;
+    const double diameters =
+        stop.link.rim_kind == RimKind::kInlet ? options_.extend_inlets : options_.extend_outlets;
+    if (!(diameters > 0)) return std::nullopt;
+    const Eigen::Matrix4Xd& samples = plan_.branches()[index(b)].samples;
+    const Eigen::Index last = samples.cols() - 1;
+    const Vec3 along =
+        (at_end ? samples.col(last) - samples.col(last - 1) : samples.col(1) - samples.col(0))
+            .head<3>()
+            .normalized();
+    const double radius = stop.path.radius_mm;
+    Stop far = stop;
+    far.path.point_mm += (at_end ? 2.0 : -2.0) * diameters * radius * along;
+    stop.path.direction = along;
+    stop.body = {stop.path.point_mm, along, radius,
+                 two_arc_circle(stop.path.point_mm, radius, along, along.unitOrthogonal()), true};
+    stop.link = {};
+    stop.link.kind = BodyLink::Kind::kCircle;
+    stop.link.circle = 2 * static_cast<int>(plan_.branches().size()) + 2 * b + (at_end ? 1 : 0);
+    const Stop& from = at_end ? stop : far;
+    const Stop& to = at_end ? far : stop;
+    BodyPiece piece = sweep(straight(from, to), from, to);
+    piece.name = "extension_" + far.link.rim_name;
+    return piece;
   }
 
   static bool close_at_opening(const BodyLink& opening, const BodyLink& rim, Outcome& outcome) {
@@ -414,8 +436,9 @@ class Seeder {
     return branch.samples(Eigen::all, inside);
   }
 
-  BodyPiece sweep(const Eigen::Matrix4Xd& target, const Stop& start, const Stop& end) const {
-    const BodyPath path = fit_body_path(target, start.path, end.path);
+  BodyPiece sweep(const Eigen::Matrix4Xd& target, const Stop& start, const Stop& end,
+                  PathFreedom freedom = PathFreedom::kNearTarget) const {
+    const BodyPath path = fit_body_path(target, start.path, end.path, freedom);
     BodyPiece piece;
     piece.path = path.curve;
     piece.start = start.body.tangent.isZero() ? free_end(path.curve, 0.0) : start.body;
@@ -511,9 +534,18 @@ class Seeder {
 
 Result<Model> seed_model(const CenterlineTree& tree, const SeedOptions& options,
                          const Progress& progress) {
-  const Result<SmoothedTree> smoothed = smooth_centerlines(tree, options.smoothing, progress);
+  const Result<SmoothedTree> smoothed = smooth_for_seed(tree, options, progress);
   if (!smoothed) return fail(smoothed.error());
   return seed_smoothed(*smoothed, options, progress);
+}
+
+Result<SmoothedTree> smooth_for_seed(const CenterlineTree& tree, const SeedOptions& options,
+                                     const Progress& progress) {
+  Result<SmoothedTree> smoothed = smooth_centerlines(tree, options.smoothing, progress);
+  if (!smoothed || !options.clearance) return smoothed;
+  KeepApartOptions apart;
+  apart.clearance = *options.clearance;
+  return keep_apart(*std::move(smoothed), apart);
 }
 
 Result<Model> seed_smoothed(const SmoothedTree& tree, const SeedOptions& options,

@@ -2,6 +2,8 @@
 // kept.
 #pragma once
 
+#include <optional>
+
 #include "base/progress.h"
 #include "base/result.h"
 #include "modeling/junction.h"
@@ -14,16 +16,30 @@ struct SeedOptions {
   SmoothingOptions smoothing;
   JunctionOptions junction;
   double body_tolerance = 0.01;  // of a body against its smoothed centerline and radius, in radii
+
+  // Straight round tubes added at free ends, along the vessel, in local diameters; 0: none. Ends
+  // where the direction of flow is not known count as outlets.
+  double extend_inlets = 0.0;
+  double extend_outlets = 0.0;
+
+  // Vessels are moved apart and thinned until their walls keep this distance, in radii of the
+  // thinner one (modeling/keep_apart.h). Unset: they stay as the tree has them.
+  std::optional<double> clearance;
 };
 
 // The surface network of a whole tree. Rims are named "inlet" ("inlet_<node>" when there are
-// several) and "outlet_<node>", regions "wall_<branch>" and "junction_<node>". A branch or junction
+// several) and "outlet_<node>", regions "wall_<branch>" and "junction_<node>", and
+// "extension_<rim>" for what was added beyond an end. A branch or junction
 // that cannot be built is listed in Model::failed and the network closes around it. Errors: nothing
 // at all could be built; stopped on request.
 Result<Model> seed_model(const CenterlineTree& tree, const SeedOptions& options = {},
                          const Progress& progress = {});
 
-// The same from a tree that is smooth already.
+// The first half of it: the tree smoothed and, if asked for, kept apart.
+Result<SmoothedTree> smooth_for_seed(const CenterlineTree& tree, const SeedOptions& options = {},
+                                     const Progress& progress = {});
+
+// The second half: from a tree that is smooth already.
 Result<Model> seed_smoothed(const SmoothedTree& tree, const SeedOptions& options = {},
                             const Progress& progress = {});
 
