@@ -8,5 +8,6 @@ namespace angiospline {
 
 }  // namespace angiospline
 
-#define EXPECTS(condition) \
-  ((condition) ? static_cast<void>(0) : ::angiospline::contract_violation(#condition, __FILE__, __LINE__))
+#define EXPECTS(condition)            \
+  ((condition) ? static_cast<void>(0) \
+               : ::angiospline::contract_violation(#condition, __FILE__, __LINE__))

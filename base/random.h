@@ -11,10 +11,10 @@ class Random {
   explicit Random(std::uint64_t seed) : state_(seed) {}
 
   std::uint64_t bits();
-  double uniform();                             // in [0, 1)
-  double uniform(double low, double high);      // in [low, high)
-  int below(int count);                         // in {0, ..., count - 1}; count > 0
-  double gaussian();                            // mean 0, standard deviation 1 (Marsaglia's polar method)
+  double uniform();                         // in [0, 1)
+  double uniform(double low, double high);  // in [low, high)
+  int below(int count);                     // in {0, ..., count - 1}; count > 0
+  double gaussian();  // mean 0, standard deviation 1 (Marsaglia's polar method)
 
  private:
   std::uint64_t state_;

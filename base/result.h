@@ -1,4 +1,5 @@
-// Failure as a value: Result<T> holds a T or an Error that names what, where, which value and which rule.
+// Failure as a value: Result<T> holds a T or an Error that names what, where, which value and which
+// rule.
 #pragma once
 
 #include <string>

@@ -1,9 +1,10 @@
 // The value at which the two ways in meet: branches with centerlines and radii, joined at nodes.
 #pragma once
 
-#include <Eigen/Core>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "base/vector.h"
 
@@ -21,20 +22,21 @@ struct CenterlineBranch {
   std::string name;
   int from = -1;
   int to = -1;
-  Points3 points_mm;            // one column a point, at least two
-  Eigen::VectorXd radii_mm;     // one for each point, positive
+  Points3 points_mm;         // one column a point, at least two
+  Eigen::VectorXd radii_mm;  // one for each point, positive
 };
 
 // A graph of branches: several components and loops are legal (the name follows the field's habit).
 struct CenterlineTree {
   std::vector<CenterlineNode> nodes;
   std::vector<CenterlineBranch> branches;
-  std::vector<int> inlets;                // nodes where flow enters; each is an end; may be empty
-  std::vector<std::string> assumptions;   // what was assumed on the way in: unit, merged lines ...
-  std::string source;                     // where it came from: a file name
+  std::vector<int> inlets;               // nodes where flow enters; each is an end; may be empty
+  std::vector<std::string> assumptions;  // what was assumed on the way in: unit, merged lines ...
+  std::string source;                    // where it came from: a file name
 };
 
-// branches_at[n]: the branches that end at node n, in order of index; a loop onto itself is listed twice.
+// branches_at[n]: the branches that end at node n, in order of index; a loop onto itself is listed
+// twice.
 std::vector<std::vector<int>> branches_at_nodes(const CenterlineTree& tree);
 
 // Number of independent cycles: branches - nodes + components.

@@ -162,8 +162,8 @@ double PenalisedSpline::criterion(double strength, double least_noise) const {
 
 namespace {
 
-// The factor of A; where rounding makes weights of very different sizes indefinite, a diagonal at the
-// size of the rounding is added.
+// The factor of A; where rounding makes weights of very different sizes indefinite, a diagonal at
+// the size of the rounding is added.
 SymmetricBand factor_of(const SymmetricBand& A) {
   double shift = std::numeric_limits<double>::epsilon() * A.row(0).maxCoeff();
   SymmetricBand L = A;

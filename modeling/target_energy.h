@@ -56,7 +56,7 @@ class TargetEnergy {
   Eigen::MatrixXd b_, bu_, bv_;          // 36 x samples
   Eigen::VectorXd sample_weights_;
   std::vector<char> beside_pole_;  // whether a sample is a pole or next to one
-  Eigen::MatrixXd roughness_;  // 36 x 36
+  Eigen::MatrixXd roughness_;      // 36 x 36
 };
 
 }  // namespace angiospline

@@ -1,6 +1,4 @@
 // The folders depend on each other downwards only, and heavy libraries stay where they belong.
-#include <gtest/gtest.h>
-
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -8,6 +6,8 @@
 #include <set>
 #include <string>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 namespace {
 
@@ -105,7 +105,8 @@ TEST(Architecture, HeavyHeadersNeverCrossOneOfOurs) {
     if (matches(include.target, "^nlopt")) solver_files.insert(include.file);
     if (!is_header(include.file) || speakers.contains(include.file)) continue;
     EXPECT_FALSE(matches(include.target, kOpenCascade) || matches(include.target, kItk) ||
-                 matches(include.target, kVtk) || matches(include.target, "^(nlopt|tiny_gltf|tbb/)"))
+                 matches(include.target, kVtk) ||
+                 matches(include.target, "^(nlopt|tiny_gltf|tbb/)"))
         << include.file << " includes " << include.target;
   }
   EXPECT_LE(solver_files.size(), 1u) << "NLopt belongs in one file";

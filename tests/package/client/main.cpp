@@ -1,6 +1,6 @@
-#include <angiospline/modeling/seed_model.h>
-
 #include <cstdio>
+
+#include <angiospline/modeling/seed_model.h>
 
 int main() {
   angiospline::CenterlineTree tree;
