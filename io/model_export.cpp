@@ -17,6 +17,7 @@
 #include "modeling/certificate.h"
 #include "modeling/split_joins.h"
 #include "modeling/tessellate_solid.h"
+#include "modeling/turn_patches.h"
 
 namespace angiospline {
 namespace {
@@ -164,8 +165,10 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
     if (needs_solid(format)) {
       std::optional<Solid>& solid = solids[wants_short_edges(format) ? 1 : 0];
       if (!solid) {
-        auto made = make_solid(wants_short_edges(format) ? split_joins(model.network, options.edges)
-                                                         : model.network);
+        SurfaceNetwork turned = turn_long_patches(model.network);
+        auto made =
+            make_solid(wants_short_edges(format) ? split_joins(std::move(turned), options.edges)
+                                                 : std::move(turned));
         if (!made) return fail(made.error());
         solid = std::move(*made);
       }

@@ -3,6 +3,7 @@
 #include "modeling/certificate.h"
 #include "modeling/solid.h"
 #include "modeling/split_joins.h"
+#include "modeling/turn_patches.h"
 #include "tests/modeling/crafted_networks.h"
 #include "tests/modeling/sample_networks.h"
 
@@ -44,6 +45,34 @@ TEST(SplitJoins, GivesTheSameClosedSolidWithTheSameFaces) {
     for (std::size_t k = 0; k < one->faces.size(); ++k) {
       EXPECT_EQ(one->faces[k].name, other->faces[k].name);
     }
+  }
+}
+
+TEST(TurnLongPatches, KeepsThePointsTheLawsAndTheSolid) {
+  for (const SurfaceNetwork& network : networks()) {
+    const SurfaceNetwork turned = turn_long_patches(network);
+    const auto defect = find_defect(turned);
+    EXPECT_FALSE(defect) << defect->message();
+    EXPECT_EQ(turned.control_points_mm, network.control_points_mm);
+    for (std::size_t k = 0; k < network.patches.size(); ++k) {
+      const auto before = patch_surface(network, static_cast<int>(k));
+      const auto after = patch_surface(turned, static_cast<int>(k));
+      EXPECT_LE(turned.patches[k].u.breakpoints().size(), turned.patches[k].v.breakpoints().size());
+      if (turned.patches[k].u.knots() == network.patches[k].u.knots()) continue;
+      const double u = 0.7 * before.u().first() + 0.3 * before.u().last();
+      const double v = 0.4 * before.v().first() + 0.6 * before.v().last();
+      const Vec3 there = after.at(v, before.u().first() + before.u().last() - u);
+      EXPECT_LT((there - before.at(u, v)).norm(), 1e-12 * (1 + there.norm()));
+    }
+    const auto one = make_solid(network), other = make_solid(turned);
+    ASSERT_TRUE(one);
+    ASSERT_TRUE(other) << other.error().message();
+    const auto a = certify(*one), b = certify(*other);
+    ASSERT_TRUE(a && b);
+    EXPECT_TRUE(b->closed && b->valid);
+    EXPECT_EQ(a->genus, b->genus);
+    EXPECT_NEAR(a->volume_mm3, b->volume_mm3, 1e-9 * a->volume_mm3);
+    EXPECT_NEAR(a->max_normal_angle_deg, b->max_normal_angle_deg, 1e-6);
   }
 }
 
