@@ -78,6 +78,21 @@ void grid_with_partials(benchmark::State& state) {
 }
 BENCHMARK(grid_with_partials);
 
+// All that SISL's s1506 gives: unit normals too.
+void grid_with_partials_and_normals(benchmark::State& state) {
+  const BSplineSurface<3> surface = sheet();
+  const auto t = spaced(0, 1, 200);
+  SurfaceGrid<3> grid;
+  Eigen::Matrix3Xd normals;
+  for (auto _ : state) {
+    grid = evaluate_grid(surface, t, t, 1, std::move(grid));
+    normals = unit_normals(grid, std::move(normals));
+    benchmark::DoNotOptimize(normals.data());
+  }
+  count_points(state, 40000);
+}
+BENCHMARK(grid_with_partials_and_normals);
+
 double cpu_seconds(clockid_t clock) {
   timespec t;
   clock_gettime(clock, &t);

@@ -1,6 +1,7 @@
 #include "kernel/grid.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/contract.h"
 #include "kernel/fit.h"
@@ -9,36 +10,82 @@ namespace angiospline {
 
 namespace {
 
-// out = sum over k of factors[k] * (row k): `rows` starts with row 0 and has `stride` doubles from
-// row to row, of which `length` count. kOrder > 0 is the number of rows known at compile time.
+// out = sum over k of factors[k] * (row k); `rows` starts with row 0 and has `length` doubles a
+// row. kOrder > 0 is the number of rows known at compile time.
 template <int kOrder>
-void combine_rows(const double* factors, int order, const double* rows, std::ptrdiff_t stride,
-                  std::ptrdiff_t length, double* __restrict out) {
+EIGEN_ALWAYS_INLINE void sum_once(const double* factors, int order, const double* rows,
+                                  std::ptrdiff_t length, double* __restrict out) {
   const int count = kOrder > 0 ? kOrder : order;
   for (std::ptrdiff_t x = 0; x < length; ++x) {
     double sum = factors[0] * rows[x];
-    for (int k = 1; k < count; ++k) sum += factors[k] * rows[k * stride + x];
+    for (int k = 1; k < count; ++k) sum += factors[k] * rows[k * length + x];
     out[x] = sum;
   }
 }
 
-using Combination = void (*)(const double*, int, const double*, std::ptrdiff_t, std::ptrdiff_t,
-                             double*);
+// Two such sums over the same rows, which are then loaded once.
+template <int kOrder>
+EIGEN_ALWAYS_INLINE void sum_twice(const double* factors_a, const double* factors_b, int order,
+                                   const double* rows, std::ptrdiff_t length,
+                                   double* __restrict out_a, double* __restrict out_b) {
+  const int count = kOrder > 0 ? kOrder : order;
+  for (std::ptrdiff_t x = 0; x < length; ++x) {
+    double a = factors_a[0] * rows[x];
+    double b = factors_b[0] * rows[x];
+    for (int k = 1; k < count; ++k) {
+      const double value = rows[k * length + x];
+      a += factors_a[k] * value;
+      b += factors_b[k] * value;
+    }
+    out_a[x] = a;
+    out_b[x] = b;
+  }
+}
 
-Combination combination_of(int order) {
+// The two for one order, in the widest instructions that this processor has. Each sum is of the
+// same terms in the same order and nothing is fused, so the bits do not depend on it.
+struct Sums {
+  void (*once)(const double*, int, const double*, std::ptrdiff_t, double*);
+  void (*twice)(const double*, const double*, int, const double*, std::ptrdiff_t, double*, double*);
+};
+
+#ifdef __x86_64__
+template <int kOrder>
+__attribute__((target("avx2"))) void once_avx2(const double* factors, int order, const double* rows,
+                                               std::ptrdiff_t length, double* out) {
+  sum_once<kOrder>(factors, order, rows, length, out);
+}
+template <int kOrder>
+__attribute__((target("avx2"))) void twice_avx2(const double* factors_a, const double* factors_b,
+                                                int order, const double* rows,
+                                                std::ptrdiff_t length, double* out_a,
+                                                double* out_b) {
+  sum_twice<kOrder>(factors_a, factors_b, order, rows, length, out_a, out_b);
+}
+#endif
+
+template <int kOrder>
+Sums sums() {
+#ifdef __x86_64__
+  if (__builtin_cpu_supports("avx2")) return {once_avx2<kOrder>, twice_avx2<kOrder>};
+#endif
+  return {sum_once<kOrder>, sum_twice<kOrder>};
+}
+
+Sums sums_of(int order) {
   switch (order) {
     case 2:
-      return combine_rows<2>;
+      return sums<2>();
     case 3:
-      return combine_rows<3>;
+      return sums<3>();
     case 4:
-      return combine_rows<4>;
+      return sums<4>();
     case 5:
-      return combine_rows<5>;
+      return sums<5>();
     case 6:
-      return combine_rows<6>;
+      return sums<6>();
     default:
-      return combine_rows<0>;
+      return sums<0>();
   }
 }
 
@@ -62,7 +109,8 @@ SurfaceGrid<D> evaluate_grid(const BSplineSurface<D>& surface, const std::vector
   if (us.empty()) return grid;
 
   const std::vector<CompactRows> along_u = collocation_matrices(surface.u(), us, derivatives);
-  const Combination combine = combination_of(surface.u().order());
+  const int order = surface.u().order();
+  const Sums sum = sums_of(order);
   int low = surface.u_count();  // the rows of the net that count
   int high = 0;
   for (int i = 0; i < grid.u_count; ++i) {
@@ -84,15 +132,40 @@ SurfaceGrid<D> evaluate_grid(const BSplineSurface<D>& surface, const std::vector
       }
       for (int i = 0; i < grid.u_count; ++i) {
         const double* rows = strip.data() + length * (along_u.front().first(i) - low);
-        for (int a = 0; a + b <= derivatives; ++a) {
-          double* out = grid.partials[SurfaceGrid<D>::place(a, b)].data();
-          combine(along_u[static_cast<std::size_t>(a)].row(i), surface.u().order(), rows, length,
-                  length, out + D * (static_cast<std::ptrdiff_t>(i) * grid.v_count + from));
+        const auto factors = [&](int a) { return along_u[static_cast<std::size_t>(a)].row(i); };
+        const auto out = [&](int a) {
+          return grid.partials[SurfaceGrid<D>::place(a, b)].data() +
+                 D * (static_cast<std::ptrdiff_t>(i) * grid.v_count + from);
+        };
+        int a = 0;
+        for (; a + 1 + b <= derivatives; a += 2) {
+          sum.twice(factors(a), factors(a + 1), order, rows, length, out(a), out(a + 1));
         }
+        if (a + b <= derivatives) sum.once(factors(a), order, rows, length, out(a));
       }
     }
   }
   return grid;
+}
+
+Eigen::Matrix3Xd unit_normals(const SurfaceGrid<3>& grid, Eigen::Matrix3Xd storage) {
+  EXPECTS(grid.derivatives >= 1);
+  Eigen::Matrix3Xd normals = std::move(storage);
+  normals.resize(3, grid.points().cols());
+  const double* u = grid.partial(1, 0).data();
+  const double* v = grid.partial(0, 1).data();
+  double* out = normals.data();
+  for (Eigen::Index k = 0; k < normals.size(); k += 3) {
+    const double x = u[k + 1] * v[k + 2] - u[k + 2] * v[k + 1];
+    const double y = u[k + 2] * v[k] - u[k] * v[k + 2];
+    const double z = u[k] * v[k + 1] - u[k + 1] * v[k];
+    const double length = std::sqrt(x * x + y * y + z * z);
+    const double scale = length > 0 ? 1 / length : 0;
+    out[k] = scale * x;
+    out[k + 1] = scale * y;
+    out[k + 2] = scale * z;
+  }
+  return normals;
 }
 
 template <int D>

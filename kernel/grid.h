@@ -37,6 +37,10 @@ SurfaceGrid<D> evaluate_grid(const BSplineSurface<D>& surface, const std::vector
                              const std::vector<double>& vs, int derivatives = 0,
                              SurfaceGrid<D> storage = {});
 
+// The unit normals Su x Sv / |Su x Sv| at every grid point, one column each; zero where the surface
+// is singular. Requires derivatives >= 1. `storage`, an earlier result, gives its memory.
+Eigen::Matrix3Xd unit_normals(const SurfaceGrid<3>& grid, Eigen::Matrix3Xd storage = {});
+
 // The k-th derivative of a curve at every parameter, one column each.
 template <int D>
 Eigen::Matrix<double, D, Eigen::Dynamic> evaluate(const BSplineCurve<D>& curve,
