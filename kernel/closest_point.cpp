@@ -5,21 +5,15 @@
 #include <limits>
 #include <vector>
 
-#include "kernel/grid.h"
+#include "kernel/bernstein_box.h"
+#include "kernel/rational.h"
 
 namespace angiospline {
 namespace {
 
 constexpr int kMaxIterations = 60;
-
-// Squared distance from a point to the box of some control points: no point of their hull is
-// nearer.
-template <int D, typename Points>
-double squared_distance_to_box(const Points& points, const Eigen::Matrix<double, D, 1>& target) {
-  const Eigen::Matrix<double, D, 1> low = points.rowwise().minCoeff();
-  const Eigen::Matrix<double, D, 1> high = points.rowwise().maxCoeff();
-  return (target - target.cwiseMax(low).cwiseMin(high)).squaredNorm();
-}
+constexpr int kMostBoxes = 100000;
+constexpr double kClose = 1e-12;  // of the largest squared distance: what is not worth halving for
 
 struct Candidate {
   double bound;
@@ -62,28 +56,76 @@ Eigen::Vector2d box_step(const Eigen::Vector2d& g, const Eigen::Matrix2d& H,
   return step.dot(g) < 0 ? step : solve(G);
 }
 
-}  // namespace
-
+// Point, first and second derivative of a curve, polynomial or rational, as columns.
 template <int D>
-CurvePoint<D> closest_point_from(const BSplineCurve<D>& curve,
-                                 const Eigen::Matrix<double, D, 1>& target, double start) {
+Eigen::Matrix<double, D, 3> jet(const BSplineCurve<D>& curve, double t) {
+  Eigen::Matrix<double, D, 3> columns;
+  const BasisValues b = basis_at(curve.knots(), t, 2);
+  columns =
+      curve.control_points().middleCols(b.first, curve.knots().order()) * b.values.transpose();
+  return columns;
+}
+template <int D>
+Eigen::Matrix<double, D, 3> jet(const BSplineCurve<D + 1>& curve, double t) {
+  return rational_derivatives<D>(curve, t, 2);
+}
+
+// S, Su, Sv, Suu, Suv, Svv of a surface.
+template <int D>
+Eigen::Matrix<double, D, 6> jet(const BSplineSurface<D>& surface, double u, double v) {
+  const BasisValues bu = basis_at(surface.u(), u, 2);
+  const BasisValues bv = basis_at(surface.v(), v, 2);
+  Eigen::Matrix<double, D, 6> columns = Eigen::Matrix<double, D, 6>::Zero();
+  for (int i = 0; i < surface.u().order(); ++i) {
+    const Eigen::Matrix<double, D, 3> row =
+        surface.control_points().middleCols(surface.index(bu.first + i, bv.first),
+                                            surface.v().order()) *
+        bv.values.transpose();
+    columns.col(0) += bu.values(0, i) * row.col(0);
+    columns.col(1) += bu.values(1, i) * row.col(0);
+    columns.col(2) += bu.values(0, i) * row.col(1);
+    columns.col(3) += bu.values(2, i) * row.col(0);
+    columns.col(4) += bu.values(1, i) * row.col(1);
+    columns.col(5) += bu.values(0, i) * row.col(2);
+  }
+  return columns;
+}
+template <int D>
+Eigen::Matrix<double, D, 6> jet(const BSplineSurface<D + 1>& surface, double u, double v) {
+  return rational_derivatives<D>(surface, u, v, 2);
+}
+
+// The point alone.
+template <int D, int H>
+Eigen::Matrix<double, D, 1> projected_point(const Eigen::Matrix<double, H, 1>& p) {
+  if constexpr (H > D) {
+    return p.template head<D>() / p(D);
+  } else {
+    return p;
+  }
+}
+
+// Newton on a curve, each step halved until it comes nearer.
+template <int D, int H>
+CurvePoint<D> descend(const BSplineCurve<H>& curve, const Eigen::Matrix<double, D, 1>& target,
+                      double start) {
   using Point = Eigen::Matrix<double, D, 1>;
   const double low = curve.knots().first();
   const double high = curve.knots().last();
   double t = std::clamp(start, low, high);
-  Point point = curve.at(t);
+  Point point = projected_point<D, H>(curve.at(t));
   double squared = (point - target).squaredNorm();
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    const Point d1 = curve.at(t, 1);
+    const Eigen::Matrix<double, D, 3> c = jet<D>(curve, t);
     const Point offset = point - target;
-    const double g = d1.dot(offset);
-    const double h = d1.squaredNorm() + curve.at(t, 2).dot(offset);
-    const double scale = h > 0 ? h : d1.squaredNorm();
+    const double g = c.col(1).dot(offset);
+    const double h = c.col(1).squaredNorm() + c.col(2).dot(offset);
+    const double scale = h > 0 ? h : c.col(1).squaredNorm();
     if (!(scale > 0)) break;
     double step = std::clamp(t - g / scale, low, high) - t;
     bool moved = false;
     for (int halving = 0; halving < 30 && step != 0; ++halving, step *= 0.5) {
-      const Point next = curve.at(t + step);
+      const Point next = projected_point<D, H>(curve.at(t + step));
       const double value = (next - target).squaredNorm();
       if (value < squared) {
         t += step;
@@ -98,68 +140,37 @@ CurvePoint<D> closest_point_from(const BSplineCurve<D>& curve,
   return {t, point, std::sqrt(squared)};
 }
 
-template <int D>
-CurvePoint<D> closest_point(const BSplineCurve<D>& curve,
-                            const Eigen::Matrix<double, D, 1>& target) {
-  const KnotVector& knots = curve.knots();
-  std::vector<Candidate> candidates;
-  for (const int span : spans_of(knots)) {
-    const auto hull = curve.control_points().middleCols(span - knots.degree(), knots.order());
-    candidates.push_back({squared_distance_to_box<D>(hull, target), span, 0});
-  }
-  sort_by_bound(candidates);
-  const double infinity = std::numeric_limits<double>::infinity();
-  CurvePoint<D> best{knots.first(), curve.at(knots.first()), infinity};
-  for (const Candidate& candidate : candidates) {
-    if (candidate.bound > best.distance * best.distance) break;
-    const int k = candidate.u_span;
-    const std::vector<double> ts = spaced(knots[k], knots[k + 1], knots.order() + 2);
-    std::vector<double> distances;
-    for (const double t : ts) distances.push_back((curve.at(t, 0, k) - target).squaredNorm());
-    for (std::size_t i = 0; i < ts.size(); ++i) {
-      const double before = i > 0 ? distances[i - 1] : infinity;
-      const double after = i + 1 < ts.size() ? distances[i + 1] : infinity;
-      if (distances[i] > before || distances[i] > after) continue;
-      const CurvePoint<D> found = closest_point_from(curve, target, ts[i]);
-      if (found.distance < best.distance || (found.distance == best.distance && found.t < best.t)) {
-        best = found;
-      }
-    }
-  }
-  return best;
-}
-
-template <int D>
-SurfacePoint<D> closest_point_from(const BSplineSurface<D>& surface,
-                                   const Eigen::Matrix<double, D, 1>& target, double start_u,
-                                   double start_v) {
+// The same on a surface.
+template <int D, int H>
+SurfacePoint<D> descend(const BSplineSurface<H>& surface, const Eigen::Matrix<double, D, 1>& target,
+                        double start_u, double start_v) {
   using Point = Eigen::Matrix<double, D, 1>;
   const Eigen::Vector2d low(surface.u().first(), surface.v().first());
   const Eigen::Vector2d high(surface.u().last(), surface.v().last());
   Eigen::Vector2d uv = Eigen::Vector2d(start_u, start_v).cwiseMax(low).cwiseMin(high);
-  Point point = surface.at(uv(0), uv(1));
+  Point point = projected_point<D, H>(surface.at(uv(0), uv(1)));
   double squared = (point - target).squaredNorm();
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    const Point su = surface.at(uv(0), uv(1), 1, 0);
-    const Point sv = surface.at(uv(0), uv(1), 0, 1);
+    const Eigen::Matrix<double, D, 6> s = jet<D>(surface, uv(0), uv(1));
     const Point offset = point - target;
-    const Eigen::Vector2d g(su.dot(offset), sv.dot(offset));
+    const Eigen::Vector2d g(s.col(1).dot(offset), s.col(2).dot(offset));
     Eigen::Matrix2d G;
-    G << su.squaredNorm(), su.dot(sv), su.dot(sv), sv.squaredNorm();
-    Eigen::Matrix2d H = G;
-    H(0, 0) += surface.at(uv(0), uv(1), 2, 0).dot(offset);
-    H(1, 1) += surface.at(uv(0), uv(1), 0, 2).dot(offset);
-    H(0, 1) += surface.at(uv(0), uv(1), 1, 1).dot(offset);
-    H(1, 0) = H(0, 1);
+    G << s.col(1).squaredNorm(), s.col(1).dot(s.col(2)), s.col(1).dot(s.col(2)),
+        s.col(2).squaredNorm();
+    Eigen::Matrix2d H2 = G;
+    H2(0, 0) += s.col(3).dot(offset);
+    H2(1, 1) += s.col(5).dot(offset);
+    H2(0, 1) += s.col(4).dot(offset);
+    H2(1, 0) = H2(0, 1);
     const auto held = [&](int k) {
       return (uv(k) <= low(k) && g(k) > 0) || (uv(k) >= high(k) && g(k) < 0);
     };
-    Eigen::Vector2d step = box_step(g, H, G, held(0), held(1));
+    Eigen::Vector2d step = box_step(g, H2, G, held(0), held(1));
     bool moved = false;
     for (int halving = 0; halving < 30; ++halving, step *= 0.5) {
       const Eigen::Vector2d next_uv = (uv + step).cwiseMax(low).cwiseMin(high);
       if (next_uv == uv) break;
-      const Point next = surface.at(next_uv(0), next_uv(1));
+      const Point next = projected_point<D, H>(surface.at(next_uv(0), next_uv(1)));
       const double value = (next - target).squaredNorm();
       if (value < squared) {
         uv = next_uv;
@@ -174,62 +185,169 @@ SurfacePoint<D> closest_point_from(const BSplineSurface<D>& surface,
   return {uv(0), uv(1), point, std::sqrt(squared)};
 }
 
-template <int D>
-SurfacePoint<D> closest_point(const BSplineSurface<D>& surface,
-                              const Eigen::Matrix<double, D, 1>& target) {
-  const KnotVector& U = surface.u();
-  const KnotVector& V = surface.v();
-  std::vector<Candidate> candidates;
-  for (const int k : spans_of(U)) {
-    for (const int l : spans_of(V)) {
-      double bound = std::numeric_limits<double>::infinity();
-      Eigen::Matrix<double, D, 1> low =
-          Eigen::Matrix<double, D, 1>::Constant(std::numeric_limits<double>::infinity());
-      Eigen::Matrix<double, D, 1> high = -low;
-      for (int i = k - U.degree(); i <= k; ++i) {
-        const auto row =
-            surface.control_points().middleCols(surface.index(i, l - V.degree()), V.order());
-        low = low.cwiseMin(row.rowwise().minCoeff());
-        high = high.cwiseMax(row.rowwise().maxCoeff());
-      }
-      bound = (target - target.cwiseMax(low).cwiseMin(high)).squaredNorm();
-      candidates.push_back({bound, k, l});
-    }
+// What the search needs of a curve and of a surface.
+template <int D, int H>
+struct CurveSearch {
+  const BSplineCurve<H>& shape;
+  const Eigen::Matrix<double, D, 1>& target;
+  using Best = CurvePoint<D>;
+
+  Best from(double u, double) const { return descend<D, H>(shape, target, u); }
+  double squared(double u, double) const {
+    return (projected_point<D, H>(shape.at(u)) - target).squaredNorm();
   }
-  sort_by_bound(candidates);
-  const double infinity = std::numeric_limits<double>::infinity();
-  SurfacePoint<D> best{U.first(), V.first(), surface.at(U.first(), V.first()), infinity};
+  static bool holds(const BernsteinBox& box, const Best& best) { return box.holds(best.t, 0); }
+  BernsteinBox box(const Candidate& span) const {
+    return bernstein_box<D, H>(shape, span.u_span, target);
+  }
+};
+
+template <int D, int H>
+struct SurfaceSearch {
+  const BSplineSurface<H>& shape;
+  const Eigen::Matrix<double, D, 1>& target;
+  using Best = SurfacePoint<D>;
+
+  Best from(double u, double v) const { return descend<D, H>(shape, target, u, v); }
+  double squared(double u, double v) const {
+    return (projected_point<D, H>(shape.at(u, v)) - target).squaredNorm();
+  }
+  static bool holds(const BernsteinBox& box, const Best& best) { return box.holds(best.u, best.v); }
+  BernsteinBox box(const Candidate& span) const {
+    return bernstein_box<D, H>(shape, span.u_span, span.v_span, target);
+  }
+};
+
+// Candidates sorted by their bounds; `best` is a first guess at infinite distance.
+template <typename Search>
+typename Search::Best search(const Search& in, const std::vector<Candidate>& candidates,
+                             typename Search::Best best) {
+  double proven = std::numeric_limits<double>::infinity();  // squared: the least bound left
+  int boxes = 0;
   for (const Candidate& candidate : candidates) {
-    if (candidate.bound > best.distance * best.distance) break;
-    const std::vector<double> us =
-        spaced(U[candidate.u_span], U[candidate.u_span + 1], U.order() + 2);
-    const std::vector<double> vs =
-        spaced(V[candidate.v_span], V[candidate.v_span + 1], V.order() + 2);
-    const int m = static_cast<int>(us.size());
-    const int n = static_cast<int>(vs.size());
-    Eigen::MatrixXd distances(m, n);
-    const SurfaceGrid<D> grid = evaluate_grid(surface, us, vs);
-    for (int i = 0; i < m; ++i) {
-      for (int j = 0; j < n; ++j) {
-        distances(i, j) = (grid.points().col(i * n + j) - target).squaredNorm();
-      }
-    }
-    for (int i = 0; i < m; ++i) {
-      for (int j = 0; j < n; ++j) {
-        const int i0 = std::max(i - 1, 0);
-        const int j0 = std::max(j - 1, 0);
-        const auto around =
-            distances.block(i0, j0, std::min(i + 2, m) - i0, std::min(j + 2, n) - j0);
-        if (distances(i, j) > around.minCoeff()) continue;
-        const SurfacePoint<D> found = closest_point_from(
-            surface, target, us[static_cast<std::size_t>(i)], vs[static_cast<std::size_t>(j)]);
+    if (candidate.bound >= best.distance * best.distance) break;
+    std::vector<BernsteinBox> stack{in.box(candidate)};
+    const BernsteinBox& whole = stack.back();
+    const double farthest =
+        whole.W.size() == 0 ? whole.F.maxCoeff() : whole.F.cwiseQuotient(whole.W).maxCoeff();
+    while (!stack.empty()) {
+      const BernsteinBox box = std::move(stack.back());
+      stack.pop_back();
+      const double bound = box.lower_bound();
+      const auto lowest = box.lowest();
+      if (bound < best.distance * best.distance &&
+          in.squared(lowest[0], lowest[1]) < best.distance * best.distance) {
+        const auto found = in.from(lowest[0], lowest[1]);
         if (found.distance < best.distance) best = found;
       }
+      const double squared = best.distance * best.distance;
+      if (bound >= squared - kClose * farthest || ++boxes > kMostBoxes) {
+        proven = std::min(proven, bound);
+        continue;
+      }
+      if (in.holds(box, best) && box.is_convex(squared)) continue;
+      auto [first, second] = box.halves();
+      stack.push_back(std::move(second));
+      stack.push_back(std::move(first));
     }
   }
+  best.lower_bound = std::sqrt(std::clamp(proven, 0.0, best.distance * best.distance));
   return best;
 }
 
+// The box of projected control points.
+template <int D, int H, typename Points>
+double squared_distance_to_hull(const Points& points, const Eigen::Matrix<double, D, 1>& target) {
+  using Point = Eigen::Matrix<double, D, 1>;
+  Point low = Point::Constant(std::numeric_limits<double>::infinity());
+  Point high = -low;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const Point p = projected_point<D, H>(points.col(i));
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return (target - target.cwiseMax(low).cwiseMin(high)).squaredNorm();
+}
+
+template <int D, int H>
+CurvePoint<D> nearest(const BSplineCurve<H>& curve, const Eigen::Matrix<double, D, 1>& target) {
+  const KnotVector& knots = curve.knots();
+  std::vector<Candidate> candidates;
+  for (const int span : spans_of(knots)) {
+    const auto hull = curve.control_points().middleCols(span - knots.degree(), knots.order());
+    candidates.push_back({squared_distance_to_hull<D, H>(hull, target), span, 0});
+  }
+  sort_by_bound(candidates);
+  return search(CurveSearch<D, H>{curve, target}, candidates,
+                {knots.first(), projected_point<D, H>(curve.at(knots.first())),
+                 std::numeric_limits<double>::infinity()});
+}
+
+template <int D, int H>
+SurfacePoint<D> nearest(const BSplineSurface<H>& surface,
+                        const Eigen::Matrix<double, D, 1>& target) {
+  const KnotVector& U = surface.u();
+  const KnotVector& V = surface.v();
+  Eigen::Matrix<double, H, Eigen::Dynamic> hull(H, U.order() * V.order());
+  std::vector<Candidate> candidates;
+  for (const int k : spans_of(U)) {
+    for (const int l : spans_of(V)) {
+      for (int i = 0; i < U.order(); ++i) {
+        hull.middleCols(i * V.order(), V.order()) = surface.control_points().middleCols(
+            surface.index(k - U.degree() + i, l - V.degree()), V.order());
+      }
+      candidates.push_back({squared_distance_to_hull<D, H>(hull, target), k, l});
+    }
+  }
+  sort_by_bound(candidates);
+  return search(SurfaceSearch<D, H>{surface, target}, candidates,
+                {U.first(), V.first(), projected_point<D, H>(surface.at(U.first(), V.first())),
+                 std::numeric_limits<double>::infinity()});
+}
+
+}  // namespace
+
+template <int D>
+CurvePoint<D> closest_point_from(const BSplineCurve<D>& curve,
+                                 const Eigen::Matrix<double, D, 1>& target, double start) {
+  return descend<D, D>(curve, target, start);
+}
+template <int D>
+SurfacePoint<D> closest_point_from(const BSplineSurface<D>& surface,
+                                   const Eigen::Matrix<double, D, 1>& target, double start_u,
+                                   double start_v) {
+  return descend<D, D>(surface, target, start_u, start_v);
+}
+
+template <int D>
+CurvePoint<D> closest_point(const BSplineCurve<D>& curve,
+                            const Eigen::Matrix<double, D, 1>& target) {
+  return nearest<D, D>(curve, target);
+}
+template <int D>
+SurfacePoint<D> closest_point(const BSplineSurface<D>& surface,
+                              const Eigen::Matrix<double, D, 1>& target) {
+  return nearest<D, D>(surface, target);
+}
+template <int D>
+CurvePoint<D> closest_point_rational(const BSplineCurve<D + 1>& curve,
+                                     const Eigen::Matrix<double, D, 1>& target) {
+  return nearest<D, D + 1>(curve, target);
+}
+template <int D>
+SurfacePoint<D> closest_point_rational(const BSplineSurface<D + 1>& surface,
+                                       const Eigen::Matrix<double, D, 1>& target) {
+  return nearest<D, D + 1>(surface, target);
+}
+
+template CurvePoint<1> closest_point_rational<1>(const BSplineCurve<2>&,
+                                                 const Eigen::Matrix<double, 1, 1>&);
+template CurvePoint<2> closest_point_rational<2>(const BSplineCurve<3>&, const Eigen::Vector2d&);
+template CurvePoint<3> closest_point_rational<3>(const BSplineCurve<4>&, const Eigen::Vector3d&);
+template SurfacePoint<2> closest_point_rational<2>(const BSplineSurface<3>&,
+                                                   const Eigen::Vector2d&);
+template SurfacePoint<3> closest_point_rational<3>(const BSplineSurface<4>&,
+                                                   const Eigen::Vector3d&);
 #define ANGIOSPLINE_INSTANTIATE(D)                                                                 \
   template SurfacePoint<D> closest_point_from(const BSplineSurface<D>&,                            \
                                               const Eigen::Matrix<double, D, 1>&, double, double); \

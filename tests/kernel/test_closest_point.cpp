@@ -4,6 +4,8 @@
 
 #include "kernel/closest_point.h"
 #include "kernel/grid.h"
+#include "kernel/rational.h"
+#include "kernel/reshape.h"
 #include "tests/kernel/random_splines.h"
 
 namespace angiospline {
@@ -57,6 +59,74 @@ TEST(ClosestPointOnSurface, FindsTheFootOfANormal) {
     EXPECT_NEAR(found.v, v, 1e-7);
     EXPECT_NEAR(found.distance, 0.2, 1e-13);
   }
+}
+
+// A single span of high degree can hide narrow valleys between any few samples.
+TEST(ClosestPoint, IsProvenGlobalInsideOneSpanOfHighDegree) {
+  Random random(4);
+  for (int round = 0; round < 60; ++round) {
+    const KnotVector knots = KnotVector::bezier(8 + random.below(14));
+    Eigen::Matrix2Xd points(2, knots.control_point_count());
+    for (int i = 0; i < points.cols(); ++i) {
+      points.col(i) << knots.greville(i), (i % 2 == 0 ? 40.0 : -40.0) * random.uniform(0.5, 1);
+    }
+    const BSplineCurve<2> curve(knots, points);
+    const Eigen::Vector2d target(random.uniform(), random.uniform(-0.2, 0.2));
+    const auto found = closest_point(curve, target);
+    const auto samples = evaluate(curve, spaced(0, 1, 20000));
+    EXPECT_LE(found.distance, (samples.colwise() - target).colwise().norm().minCoeff() + 1e-12);
+    EXPECT_LE(found.lower_bound, found.distance);
+    EXPECT_GE(found.lower_bound * found.lower_bound, found.distance * found.distance - 1e-8);
+  }
+}
+
+TEST(ClosestPoint, IsProvenOnSurfacesOfHighDegreeToo) {
+  Random random(5);
+  for (int round = 0; round < 12; ++round) {
+    const BSplineSurface<3> surface = random_surface<3>(
+        random, KnotVector::bezier(5 + random.below(5)), KnotVector::clamped(5, {0, 0.3, 1}));
+    const Eigen::Vector3d target(random.uniform(-1, 1), random.uniform(-1, 1),
+                                 random.uniform(-1, 1));
+    const auto found = closest_point(surface, target);
+    const auto t = spaced(0, 1, 150);
+    EXPECT_LE(
+        found.distance,
+        (evaluate_grid(surface, t, t).points().colwise() - target).colwise().norm().minCoeff() +
+            1e-12);
+    EXPECT_LE(found.lower_bound, found.distance);
+    EXPECT_GE(found.lower_bound * found.lower_bound, found.distance * found.distance - 1e-11);
+  }
+}
+
+// The unit circle as four rational quarters: from its centre every point is equally near.
+TEST(ClosestPoint, OnARationalCircleAndCylinderIsKnown) {
+  const double h = std::sqrt(0.5);
+  Eigen::Matrix2Xd points(2, 9);
+  points << 1, 1, 0, -1, -1, -1, 0, 1, 1, 0, 1, 1, 1, 0, -1, -1, -1, 0;
+  Eigen::VectorXd weights(9);
+  weights << 1, h, 1, h, 1, h, 1, h, 1;
+  const KnotVector knots = KnotVector::clamped(2, {0, 1, 2, 3, 4}, 2);
+  const BSplineCurve<3> circle(knots, homogeneous<2>(points, weights));
+  Eigen::Matrix4Xd net(4, 18);
+  for (int i = 0; i < 9; ++i) {
+    const Eigen::Vector3d c = circle.control_points().col(i);
+    net.col(2 * i) << c(0), c(1), 0, c(2);
+    net.col(2 * i + 1) << c(0), c(1), 5 * c(2), c(2);
+  }
+  const BSplineSurface<4> cylinder(knots, KnotVector::bezier(1), net);
+  Random random(6);
+  for (int round = 0; round < 60; ++round) {
+    const Eigen::Vector2d q(random.uniform(-2, 2), random.uniform(-2, 2));
+    const auto on_circle = closest_point_rational<2>(circle, q);
+    EXPECT_NEAR(on_circle.distance, std::abs(q.norm() - 1), 1e-12);
+    EXPECT_NEAR(on_circle.lower_bound, on_circle.distance, 1e-5);
+    const double z = random.uniform(-1, 6);
+    const auto on_wall = closest_point_rational<3>(cylinder, Eigen::Vector3d(q.x(), q.y(), z));
+    const double beyond = std::max({0.0, -z, z - 5});
+    EXPECT_NEAR(on_wall.distance, std::hypot(q.norm() - 1, beyond), 1e-12);
+    EXPECT_NEAR(on_wall.lower_bound, on_wall.distance, 1e-5);
+  }
+  EXPECT_NEAR(closest_point_rational<2>(circle, Eigen::Vector2d(0, 0)).distance, 1, 1e-15);
 }
 
 TEST(ClosestPointOnSurface, StopsAtTheBoundary) {
