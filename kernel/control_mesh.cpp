@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/contract.h"
+#include "kernel/periodic.h"
 #include "kernel/refinement.h"
 #include "kernel/reshape.h"
 
@@ -123,6 +124,20 @@ Error too_many(Eigen::Index count, int most) {
 
 constexpr int kMostRounds = 64;
 
+template <int D>
+Result<BSplineSurface<D>> insert_u(const BSplineSurface<D>& surface, std::vector<double> added) {
+  const Result<KnotVector> u = with_knots(surface.u(), std::move(added));
+  if (!u) return fail(u.error());
+  return refine(surface, *u, surface.v());
+}
+
+template <int D>
+Result<BSplineSurface<D>> insert_v(const BSplineSurface<D>& surface, std::vector<double> added) {
+  const Result<KnotVector> v = with_knots(surface.v(), std::move(added));
+  if (!v) return fail(v.error());
+  return refine(surface, surface.u(), *v);
+}
+
 }  // namespace
 
 template <int D>
@@ -143,6 +158,7 @@ template <int D>
 Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
                                             const MeshOptions& options) {
   if (auto error = mesh_error(curve.knots(), options, "curve")) return fail(*error);
+  const bool closed = is_periodic(curve);
   RefinedCurve<D> result{curve, 0};
   for (int round = 0; round < kMostRounds; ++round) {
     const BSplineCurve<D>& at = result.curve;
@@ -156,7 +172,8 @@ Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
     if (count > options.most_control_points) {
       return fail(too_many(count, options.most_control_points));
     }
-    Result<BSplineCurve<D>> finer = insert_knots(at, added);
+    Result<BSplineCurve<D>> finer =
+        closed ? insert_knots_periodic(at, added) : insert_knots(at, added);
     if (!finer) return fail(finer.error());
     result.curve = std::move(*finer);
   }
@@ -171,6 +188,8 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
                                               const MeshOptions& options) {
   if (auto error = mesh_error(surface.u(), options, "u direction")) return fail(*error);
   if (auto error = mesh_error(surface.v(), options, "v direction")) return fail(*error);
+  const bool closed_u = is_periodic_u(surface);
+  const bool closed_v = is_periodic_v(surface);
   RefinedSurface<D> result{surface, 0};
   for (int round = 0; round < kMostRounds; ++round) {
     const BSplineSurface<D>& at = result.surface;
@@ -193,11 +212,12 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
     if (count > options.most_control_points) {
       return fail(too_many(count, options.most_control_points));
     }
-    const Result<KnotVector> u = with_knots(at.u(), added_u);
-    const Result<KnotVector> v = with_knots(at.v(), added_v);
-    if (!u) return fail(u.error());
-    if (!v) return fail(v.error());
-    result.surface = refine(at, *u, *v);
+    const auto finer_u = closed_u ? insert_knots_periodic_u(at, added_u) : insert_u(at, added_u);
+    if (!finer_u) return fail(finer_u.error());
+    auto finer =
+        closed_v ? insert_knots_periodic_v(*finer_u, added_v) : insert_v(*finer_u, added_v);
+    if (!finer) return fail(finer.error());
+    result.surface = std::move(*finer);
   }
   return fail(too_many(result.surface.control_points().cols(), options.most_control_points));
 }

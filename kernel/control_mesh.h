@@ -51,7 +51,7 @@ struct RefinedSurface {
 // convergence asks for, until none is. For surfaces the tolerance is shared between the directions
 // so that few control points are needed. Errors: tolerance not positive; a jump inside
 // (multiplicity above the degree), over which no polygon converges; more control points needed than
-// allowed. D is 1 to 4 (surfaces 2 to 4).
+// allowed. What is closed stays closed. D is 1 to 4 (surfaces 2 to 4).
 template <int D>
 Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
                                             const MeshOptions& options);

@@ -10,25 +10,6 @@
 namespace angiospline {
 namespace {
 
-// Cuts in four every span that one of the marked functions reaches.
-KnotVector quartered(const KnotVector& knots, const std::vector<int>& functions) {
-  std::vector<double> added;
-  int next = 0;  // spans before this one are done
-  for (const int i : functions) {
-    for (int k = std::max(i, next); k <= i + knots.degree(); ++k, next = k) {
-      const double from = std::max(knots[k], knots.first());
-      const double to = std::min(knots[k + 1], knots.last());
-      for (int part = 1; part < 4; ++part) {
-        const double t = from + 0.25 * part * (to - from);
-        if (t > from && t < to) added.push_back(t);
-      }
-    }
-  }
-  Result<KnotVector> fine = with_knots(knots, std::move(added));
-  EXPECTS(fine.has_value());
-  return std::move(*fine);
-}
-
 std::size_t size_of(const KnotVector& knots, int stride) {
   return static_cast<std::size_t>(knots.control_point_count()) * static_cast<std::size_t>(stride);
 }
@@ -43,7 +24,42 @@ KnotVector clamped_ends(const KnotVector& knots) {
   return std::move(*clamped);
 }
 
-// Whether the knots outside the open domain are the same.
+// Functions `from` .. `to` of a spline with those that share a span with them, as a spline of its
+// own over the spans that `from` .. `to` reach, with these cut in four: its longest group, squared.
+double largest_quartered(const KnotVector& knots, int from, int to, const double* blocks,
+                         int stride, int group) {
+  const int p = knots.degree();
+  const int low = std::max(0, from - p);
+  const int high = std::min(knots.control_point_count() - 1, to + p);
+  const auto begin = knots.knots().begin();
+  const Result<KnotVector> part =
+      KnotVector::make(p, std::vector<double>(begin + low, begin + high + p + 2));
+  if (!part) return 0;  // functions that reach no span of the domain
+  std::vector<double> added;
+  for (int k = p; k < part->control_point_count(); ++k) {
+    const double a = (*part)[k];
+    const double b = (*part)[k + 1];
+    for (int quarter = 1; quarter < 4; ++quarter) {
+      const double t = a + 0.25 * quarter * (b - a);
+      if (t > a && t < b) added.push_back(t);
+    }
+  }
+  const Result<KnotVector> fine = with_knots(*part, std::move(added));
+  EXPECTS(fine.has_value());
+  std::vector<double> finer(size_of(*fine, stride));
+  add_refined(1, *part, *fine, blocks + static_cast<std::ptrdiff_t>(low) * stride, stride,
+              finer.data());
+  double largest = 0;
+  for (int i = 0; i < fine->control_point_count(); ++i) {
+    largest = std::max(
+        largest,
+        largest_squared(finer.data() + static_cast<std::ptrdiff_t>(i) * stride, stride, group));
+  }
+  return largest;
+}
+
+}  // namespace
+
 bool same_ends(const KnotVector& a, const KnotVector& b) {
   const auto outer = [](const KnotVector& knots) {
     std::vector<double> values;
@@ -55,8 +71,6 @@ bool same_ends(const KnotVector& a, const KnotVector& b) {
   return outer(a) == outer(b);
 }
 
-}  // namespace
-
 double largest_squared(const double* block, int stride, int group) {
   double largest = 0;
   for (int k = 0; k < stride; k += group) {
@@ -65,14 +79,6 @@ double largest_squared(const double* block, int stride, int group) {
     largest = std::max(largest, sum);
   }
   return largest;
-}
-
-double largest_norm(const std::vector<double>& blocks, int stride, int group) {
-  double largest = 0;
-  for (std::size_t k = 0; k < blocks.size(); k += static_cast<std::size_t>(stride)) {
-    largest = std::max(largest, largest_squared(blocks.data() + k, stride, group));
-  }
-  return std::sqrt(largest);
 }
 
 double difference_bound(const KnotVector& a_knots, const double* a, const KnotVector& b_knots,
@@ -91,17 +97,26 @@ double difference_bound(const KnotVector& a_knots, const double* a, const KnotVe
   std::vector<double> difference(size_of(both, stride));
   add_refined(1, a_knots, both, a, stride, difference.data());
   add_refined(-1, b_knots, both, b, stride, difference.data());
-  const double bound = largest_norm(difference, stride, group);
-  if (bound <= enough) return bound;
-  std::vector<int> beyond;
-  for (int i = 0; i < both.control_point_count(); ++i) {
-    const double* block = difference.data() + static_cast<std::ptrdiff_t>(i) * stride;
-    if (largest_squared(block, stride, group) > enough * enough) beyond.push_back(i);
+  // Where a control point is beyond `enough`, the finer ones around it count in its place.
+  double bound = 0;
+  const int count = both.control_point_count();
+  const auto length = [&](int i) {
+    return largest_squared(difference.data() + static_cast<std::ptrdiff_t>(i) * stride, stride,
+                           group);
+  };
+  for (int i = 0; i < count; ++i) {
+    double here = length(i);
+    if (here > enough * enough) {
+      int last = i;  // runs of functions that share spans are one
+      for (int k = i + 1; k < count && k <= last + both.degree(); ++k) {
+        if (length(k) > enough * enough) last = k;
+      }
+      here = largest_quartered(both, i, last, difference.data(), stride, group);
+      i = last;
+    }
+    bound = std::max(bound, here);
   }
-  const KnotVector fine = quartered(both, beyond);
-  std::vector<double> finer(size_of(fine, stride));
-  add_refined(1, both, fine, difference.data(), stride, finer.data());
-  return std::min(bound, largest_norm(finer, stride, group));
+  return std::sqrt(bound);
 }
 
 }  // namespace angiospline

@@ -330,6 +330,18 @@ Result<CurveFit<D>> fit_curve(const KnotVector& knots, const std::vector<double>
   return fit;
 }
 
+Result<Eigen::MatrixXd> least_squares_rows(const KnotVector& knots,
+                                           const std::vector<double>& parameters,
+                                           const Eigen::MatrixXd& values) {
+  if (values.rows() != static_cast<Eigen::Index>(parameters.size())) {
+    return fail(count_error(static_cast<std::size_t>(values.rows()), parameters.size(), "values"));
+  }
+  if (auto error = parameter_error(knots, parameters)) return fail(*error);
+  const HeldEnds none{Eigen::MatrixXd(0, values.cols()), Eigen::MatrixXd(0, values.cols())};
+  return least_squares(collocation_matrix(knots, parameters), values,
+                       Eigen::VectorXd::Ones(values.rows()), none, nullptr, 0);
+}
+
 template <int D>
 Result<BSplineSurface<D>> fit_surface(const KnotVector& u, const KnotVector& v,
                                       const std::vector<double>& us, const std::vector<double>& vs,
@@ -343,17 +355,11 @@ Result<BSplineSurface<D>> fit_surface(const KnotVector& u, const KnotVector& v,
   const auto solve_direction = [](const char* name, const KnotVector& knots,
                                   const std::vector<double>& parameters,
                                   const Eigen::MatrixXd& values) -> Result<Eigen::MatrixXd> {
-    const auto blame = [&](Error error) {
-      error.where = std::string(name) + " direction, " + error.where;
-      return fail(std::move(error));
-    };
-    if (auto error = parameter_error(knots, parameters)) return blame(*error);
-    const HeldEnds none{Eigen::MatrixXd(0, values.cols()), Eigen::MatrixXd(0, values.cols())};
-    Result<Eigen::MatrixXd> x =
-        least_squares(collocation_matrix(knots, parameters), values,
-                      Eigen::VectorXd::Ones(values.rows()), none, nullptr, 0);
-    if (!x) return blame(x.error());
-    return x;
+    Result<Eigen::MatrixXd> x = least_squares_rows(knots, parameters, values);
+    if (x) return x;
+    Error error = x.error();
+    error.where = std::string(name) + " direction, " + error.where;
+    return fail(std::move(error));
   };
   const Result<Eigen::MatrixXd> along_u = solve_direction(
       "u", u, us, Eigen::Map<const Eigen::MatrixXd>(points.data(), D * n, m).transpose());

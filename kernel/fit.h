@@ -81,6 +81,12 @@ Result<CurveFit<D>> fit_curve(const KnotVector& knots, const std::vector<double>
                               const Eigen::Matrix<double, D, Eigen::Dynamic>& points,
                               const CurveFitOptions<D>& options = {});
 
+// The least-squares control points over `knots`, one row each, for any number of coordinates:
+// values have one row for each parameter. Errors as fit_curve.
+Result<Eigen::MatrixXd> least_squares_rows(const KnotVector& knots,
+                                           const std::vector<double>& parameters,
+                                           const Eigen::MatrixXd& values);
+
 // The least-squares surface on a grid of points: point (i, j) at (us[i], vs[j]) is column
 // i * vs.size() + j. Errors as for curves, saying which direction. One curve system for each
 // direction.

@@ -11,8 +11,36 @@
 #include "kernel/reduce_engine.h"
 #include "kernel/refinement.h"
 #include "kernel/reshape.h"
+#include "kernel/split.h"
 
 namespace angiospline {
+namespace {
+
+// The first broken requirement of the options, or nothing.
+std::optional<Error> reduction_option_error(const KnotVector& knots, double tolerance,
+                                            int held_first, int held_last) {
+  const auto error = [](std::string what, std::string value, std::string rule) {
+    return Error{ErrorKind::kBadInput, std::move(what), "data reduction", std::move(value),
+                 std::move(rule)};
+  };
+  if (!(tolerance > 0) || !std::isfinite(tolerance)) {
+    return error("tolerance is not positive", std::to_string(tolerance), "must be above 0");
+  }
+  const int most = knots.order() / 2;
+  if (held_first < 0 || held_last < 0 || held_first > most || held_last > most) {
+    return error("wrong number of held derivatives",
+                 std::to_string(held_first) + " and " + std::to_string(held_last),
+                 "0 to half the order, " + std::to_string(most) + ", at each end");
+  }
+  const bool clamped_first = knots.knots().front() == knots.first();
+  const bool clamped_last = knots.knots().back() == knots.last();
+  if ((held_first > 0 && !clamped_first) || (held_last > 0 && !clamped_last)) {
+    return error("an end is held on floating knots", {}, "clamp the ends, or hold nothing there");
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 template <int D>
 Result<ReducedCurve<D>> reduce(const BSplineCurve<D>& curve, const ReductionOptions& options) {
@@ -65,6 +93,7 @@ DirectionResult reduce_u(const BSplineSurface<D>& surface, double tolerance,
                                  .held_last = options.held_u1,
                                  .kept = options.kept_u,
                                  .polish = options.polish,
+                                 .closed = is_periodic_u(surface),
                                  .proof = proof};
   const int step = lines / kLines;
   if (step < 2) return reduce_direction(problem);
@@ -111,6 +140,10 @@ SurfaceReductionOptions swapped(const SurfaceReductionOptions& o) {
 // control points, so the hull argument holds in both directions.
 template <int D>
 double surface_difference(const BSplineSurface<D>& a, const BSplineSurface<D>& b, double enough) {
+  if (!same_ends(a.v(), b.v())) {  // closed: clamped for the bound
+    return surface_difference(restrict_v(a, a.v().first(), a.v().last()),
+                              restrict_v(b, b.v().first(), b.v().last()), enough);
+  }
   const KnotVector v = merged_knots(a.v(), b.v());
   const BSplineSurface<D> fine_a = refine(a, a.u(), v);
   const BSplineSurface<D> fine_b = refine(b, b.u(), v);

@@ -72,7 +72,8 @@ struct ReducedSurface {
 };
 
 // The same for tensor-product surfaces: one direction with a share of the tolerance, then the other
-// with what is left; both orders are tried and the better kept.
+// with what is left; both orders are tried and the better kept. A closed direction (is_periodic_u,
+// v) stays closed, with the continuity of its seam, and has no sides to hold.
 template <int D>
 Result<ReducedSurface<D>> reduce(const BSplineSurface<D>& surface,
                                  const SurfaceReductionOptions& options);

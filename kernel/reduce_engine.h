@@ -24,8 +24,4 @@ DirectionResult reduce_direction(const ReductionProblem& problem);
 std::optional<DirectionResult> fit_direction(const ReductionProblem& problem,
                                              const Interior& interior);
 
-// The first broken requirement of the options, or nothing.
-std::optional<Error> reduction_option_error(const KnotVector& knots, double tolerance,
-                                            int held_first, int held_last);
-
 }  // namespace angiospline

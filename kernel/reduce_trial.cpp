@@ -114,6 +114,27 @@ void TrialSolver::hold_ends(const KnotVector& knots, std::vector<double>& points
   hold(knots.last(), problem_.held_last, false);
 }
 
+namespace {
+
+// Adds weight * a a' to the lower band (row i: (i, i), (i, i - 1), ...) and weight * a value' to
+// the right-hand side, for a sample all of whose functions are free. `backwards` is a in that
+// order.
+template <int kOrder>
+void add_sample(double weight, const double* a, const double* value, double* band,
+                std::ptrdiff_t width, double* right) {
+  std::array<double, kOrder> backwards;
+  for (std::size_t k = 0; k < kOrder; ++k) backwards[k] = a[kOrder - 1 - k];
+  for (int i = 0; i < kOrder; ++i) {
+    const double scaled = weight * a[i];
+    const double* from = backwards.data() + (kOrder - 1 - i);
+    double* row = band + i * width;
+    for (int d = 0; d <= i; ++d) row[d] += scaled * from[d];
+    for (int c = 0; c < 3; ++c) right[3 * i + c] += scaled * value[c];
+  }
+}
+
+}  // namespace
+
 bool TrialSolver::solve(Trial& trial, const std::vector<double>& weights) {
   const CompactRows& A = matrix_;
   const int head = problem_.held_first;
@@ -139,6 +160,11 @@ bool TrialSolver::solve(Trial& trial, const std::vector<double>& weights) {
                    stride_, rest.data());
       }
       value = rest.data();
+    }
+    if (p_ == 5 && stride_ == 3 && first >= 0 && first + p_ < free) {  // quintics of the world
+      add_sample<6>(weights[at(i_sample)], a, value, &N.at(first, first), 6,
+                    right + static_cast<std::ptrdiff_t>(first) * stride_);
+      continue;
     }
     const int low = std::max(0, -first);
     const int high = std::min(p_, free - 1 - first);
@@ -186,13 +212,17 @@ Trial TrialSolver::attempt(const Interior& interior, int step, const std::vector
   ++trials_;
   Trial trial{interior, trial_knots(interior), {}, step, std::numeric_limits<double>::infinity(),
               {}};
-  parameters_.clear();
   const int count = static_cast<int>(nodes_.size());
-  for (int i = 0; i < count - 1 + step; i += step) {
-    parameters_.push_back(nodes_[at(std::min(i, count - 1))]);
+  const int samples = (count + step - 2) / step + 1;  // every step-th, and the last
+  work_ += samples;
+  const bool known = matrix_knots_ && matrix_step_ == step && *matrix_knots_ == trial.knots;
+  if (!known) {
+    parameters_.clear();
+    for (int k = 0; k < samples; ++k) parameters_.push_back(nodes_[at(sample(k, step))]);
+    collocate(trial.knots, parameters_, matrix_);
+    matrix_knots_ = trial.knots;
+    matrix_step_ = step;
   }
-  work_ += static_cast<long>(parameters_.size());
-  collocate(trial.knots, parameters_, matrix_);
   if (problem_.closed ? solve_closed(trial, weights) : solve(trial, weights)) measure(trial);
   return trial;
 }

@@ -91,9 +91,11 @@ class TrialSolver {
   int trials_ = 0;
   long work_ = 0;
 
-  // Of the last trial; here to keep their memory.
+  // Of the last trial; here to keep their memory, and the matrix for new weights.
   std::vector<double> parameters_;
   CompactRows matrix_{1, 1, 1};
+  std::optional<KnotVector> matrix_knots_;
+  int matrix_step_ = 0;
   std::vector<double> difference_;
 };
 

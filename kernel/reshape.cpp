@@ -7,6 +7,7 @@
 #include "base/contract.h"
 #include "kernel/blossom.h"
 #include "kernel/knot_algebra.h"
+#include "kernel/periodic.h"
 #include "kernel/refinement.h"
 #include "kernel/split.h"
 
@@ -52,24 +53,41 @@ BSplineCurve<D> clamp(const BSplineCurve<D>& curve) {
   return restrict_to(curve, curve.knots().first(), curve.knots().last());
 }
 
+// What was made of a closed spline is closed too, but for rounding; unless it may jump at the seam.
+template <int D>
+BSplineCurve<D> closed_if(bool closed, BSplineCurve<D> curve) {
+  return closed && periodic_count(curve.knots()) ? closed_up(curve) : curve;
+}
+
+template <int D>
+BSplineSurface<D> closed_if(bool closed_u, bool closed_v, BSplineSurface<D> surface) {
+  if (closed_u && periodic_count(surface.u())) surface = closed_up_u(surface);
+  if (closed_v && periodic_count(surface.v())) surface = closed_up_v(surface);
+  return surface;
+}
+
 }  // namespace
 
 template <int D>
 BSplineCurve<D> derivative(const BSplineCurve<D>& curve) {
   Differences d = differences(curve.knots());
-  return BSplineCurve<D>(std::move(d.knots), d.matrix.template apply<D>(curve.control_points()));
+  return closed_if(
+      is_periodic(curve),
+      BSplineCurve<D>(std::move(d.knots), d.matrix.template apply<D>(curve.control_points())));
 }
 
 template <int D>
 BSplineSurface<D> derivative_u(const BSplineSurface<D>& surface) {
   const Differences d = differences(surface.u());
-  return transform_u(surface, d.matrix, d.knots);
+  return closed_if(is_periodic_u(surface), is_periodic_v(surface),
+                   transform_u(surface, d.matrix, d.knots));
 }
 
 template <int D>
 BSplineSurface<D> derivative_v(const BSplineSurface<D>& surface) {
   const Differences d = differences(surface.v());
-  return transform_v(surface, d.matrix, d.knots);
+  return closed_if(is_periodic_u(surface), is_periodic_v(surface),
+                   transform_v(surface, d.matrix, d.knots));
 }
 
 // The blossom of the elevated piece is the mean, over the argument left out, of the old blossom.
@@ -100,12 +118,13 @@ template <int D>
 BSplineCurve<D> elevate(const BSplineCurve<D>& curve, int by) {
   EXPECTS(by >= 0);
   BSplineCurve<D> result = curve;
+  const bool was_closed = is_periodic(curve);
   for (; by > 0; --by) {
     result = BSplineCurve<D>(
         elevated_knots(result.knots(), 1),
         elevation_matrix(result.knots()).template apply<D>(result.control_points()));
   }
-  return result;
+  return closed_if(was_closed, std::move(result));
 }
 
 template <int D>
@@ -118,7 +137,7 @@ BSplineSurface<D> elevate(const BSplineSurface<D>& surface, int by_u, int by_v) 
   for (; by_v > 0; --by_v) {
     result = transform_v(result, elevation_matrix(result.v()), elevated_knots(result.v(), 1));
   }
-  return result;
+  return closed_if(is_periodic_u(surface), is_periodic_v(surface), std::move(result));
 }
 
 template <int D>
@@ -202,16 +221,56 @@ Result<BSplineCurve<D>> join(const BSplineCurve<D>& first, const BSplineCurve<D>
   return BSplineCurve<D>(std::move(*joined), std::move(points));
 }
 
+namespace {
+
+// The same for closed curves, which stay closed: all have the union of the knots of a period.
+template <int D>
+std::vector<BSplineCurve<D>> make_closed_compatible(std::vector<BSplineCurve<D>> curves) {
+  std::vector<double> all;
+  const auto add_missing = [](const KnotVector& knots, const KnotVector& from,
+                              std::vector<double>& missing) {
+    for (const Knot& knot : distinct_knots(from)) {
+      if (knot.value < knots.first() || knot.value >= knots.last()) continue;
+      const int count = knot.multiplicity - knots.multiplicity(knot.value);
+      missing.insert(missing.end(), static_cast<std::size_t>(std::max(count, 0)), knot.value);
+    }
+  };
+  KnotVector common = curves.front().knots();
+  for (const BSplineCurve<D>& curve : curves) {
+    std::vector<double> missing;
+    add_missing(common, curve.knots(), missing);
+    const Result<KnotVector> both = with_knots_periodic(common, std::move(missing));
+    EXPECTS(both.has_value());
+    common = *both;
+  }
+  for (BSplineCurve<D>& curve : curves) {
+    std::vector<double> missing;
+    add_missing(curve.knots(), common, missing);
+    const Result<BSplineCurve<D>> fine = insert_knots_periodic(curve, std::move(missing));
+    EXPECTS(fine.has_value());
+    curve = *fine;
+  }
+  return curves;
+}
+
+}  // namespace
+
 template <int D>
 std::vector<BSplineCurve<D>> make_compatible(std::vector<BSplineCurve<D>> curves) {
   EXPECTS(!curves.empty());
   int degree = 0;
-  for (const BSplineCurve<D>& curve : curves) degree = std::max(degree, curve.knots().degree());
+  bool closed = true;
+  for (const BSplineCurve<D>& curve : curves) {
+    degree = std::max(degree, curve.knots().degree());
+    closed = closed && is_periodic(curve);
+  }
   const double first = curves.front().knots().first();
   const double last = curves.front().knots().last();
   for (BSplineCurve<D>& curve : curves) {
-    curve = over(elevate(clamp(curve), degree - curve.knots().degree()), first, last);
+    const int by = degree - curve.knots().degree();
+    curve = over(elevate(closed ? curve : clamp(curve), by), first, last);
   }
+  if (closed) return make_closed_compatible(std::move(curves));
   KnotVector common = curves.front().knots();
   for (const BSplineCurve<D>& curve : curves) common = merged_knots(common, curve.knots());
   for (BSplineCurve<D>& curve : curves) curve = refine(curve, common);

@@ -1,4 +1,5 @@
-// The same shape in another form: derivative, elevated, reversed, joined, compatible.
+// The same shape in another form: derivative, elevated, reversed, joined, compatible. Closed curves
+// and closed directions of surfaces (kernel/periodic.h) stay closed.
 #pragma once
 
 #include <vector>
@@ -11,7 +12,8 @@
 namespace angiospline {
 
 // The derivative as a spline of one degree less over the same domain (degree 0 gives zero). Where a
-// curve jumps (multiplicity above the degree) the jump is left out. D is 1 to 4 throughout.
+// curve jumps (multiplicity above the degree) the jump is left out; a closed curve with a corner at
+// its seam has a derivative that is not closed. D is 1 to 4 throughout.
 template <int D>
 BSplineCurve<D> derivative(const BSplineCurve<D>& curve);
 template <int D>
@@ -55,8 +57,8 @@ template <int D>
 Result<BSplineCurve<D>> join(const BSplineCurve<D>& first, const BSplineCurve<D>& second,
                              double gap);
 
-// All with the highest degree, the first one's domain and the union of the knots, after floating
-// ends are clamped. Requires at least one.
+// All with the highest degree, the first one's domain and the union of the knots. Where all are
+// closed they stay so; otherwise floating ends are clamped first. Requires at least one.
 template <int D>
 std::vector<BSplineCurve<D>> make_compatible(std::vector<BSplineCurve<D>> curves);
 
