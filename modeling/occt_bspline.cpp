@@ -1,6 +1,7 @@
 #include "modeling/occt_bspline.h"
 
 #include <algorithm>
+#include <vector>
 
 #include <TColStd_Array1OfInteger.hxx>
 #include <TColStd_Array1OfReal.hxx>
@@ -15,179 +16,179 @@
 namespace angiospline {
 namespace {
 
-struct DistinctKnots {
+gp_Pnt point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+Vec3 vector(const gp_Pnt& p) { return {p.X(), p.Y(), p.Z()}; }
+
+// One direction as OpenCASCADE holds it: the distinct knots, and of a periodic one those of the
+// period and the distinct poles. Its flat knots, and so the numbers of its poles, are those of
+// periodic_knots: degree + 1 - multiplicity knots before the first copy of the start.
+struct Axis {
   TColStd_Array1OfReal values;
   TColStd_Array1OfInteger multiplicities;
+  int poles;
+  bool periodic;
 };
 
-DistinctKnots distinct(const KnotVector& knots) {
-  EXPECTS(knots.knots().front() == knots.first() && knots.knots().back() == knots.last());
-  const std::vector<double> breaks = knots.breakpoints();
-  const int count = static_cast<int>(breaks.size());
-  DistinctKnots result{TColStd_Array1OfReal(1, count), TColStd_Array1OfInteger(1, count)};
-  std::size_t at = 0;
+Axis axis(const KnotVector& knots, bool closed) {
+  std::vector<Knot> distinct = distinct_knots(knots);
+  if (closed) {
+    std::erase_if(distinct,
+                  [&](const Knot& k) { return k.value < knots.first() || k.value > knots.last(); });
+    // Floating knots show all copies of the seam at one end at least.
+    distinct.front().multiplicity = distinct.back().multiplicity =
+        std::max(distinct.front().multiplicity, distinct.back().multiplicity);
+  }
+  const int count = static_cast<int>(distinct.size());
+  Axis result{TColStd_Array1OfReal(1, count), TColStd_Array1OfInteger(1, count),
+              closed ? *periodic_count(knots) : knots.control_point_count(), closed};
   for (int i = 1; i <= count; ++i) {
-    const double value = breaks[static_cast<std::size_t>(i) - 1];
-    int multiplicity = 0;
-    while (at < knots.knots().size() && knots.knots()[at] == value) ++at, ++multiplicity;
-    result.values.SetValue(i, value);
-    result.multiplicities.SetValue(i, multiplicity);
+    result.values.SetValue(i, distinct[static_cast<std::size_t>(i) - 1].value);
+    result.multiplicities.SetValue(i, distinct[static_cast<std::size_t>(i) - 1].multiplicity);
   }
   return result;
 }
 
-std::optional<KnotVector> knot_vector(int degree, const TColStd_Array1OfReal& flat) {
-  Result<KnotVector> made = KnotVector::make(degree, std::vector<double>(flat.begin(), flat.end()));
+// And back; nothing where OpenCASCADE's knots break an invariant of ours.
+std::optional<KnotVector> knot_vector(int degree, const TColStd_Array1OfReal& values,
+                                      const TColStd_Array1OfInteger& multiplicities,
+                                      bool periodic) {
+  std::vector<Knot> distinct;
+  for (int i = values.Lower(); i <= values.Upper(); ++i) {
+    distinct.push_back({values.Value(i), multiplicities.Value(i)});
+  }
+  Result<KnotVector> made = [&] {
+    if (!periodic) return from_distinct(degree, distinct);
+    distinct.pop_back();
+    return periodic_knots(degree, distinct, values.Last());
+  }();
   if (!made) return std::nullopt;
   return *std::move(made);
 }
 
-gp_Pnt point(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+std::optional<KnotVector> knots_of(const Geom_BSplineCurve& curve) {
+  return knot_vector(curve.Degree(), curve.Knots(), curve.Multiplicities(), curve.IsPeriodic());
+}
+std::optional<KnotVector> u_knots_of(const Geom_BSplineSurface& surface) {
+  return knot_vector(surface.UDegree(), surface.UKnots(), surface.UMultiplicities(),
+                     surface.IsUPeriodic());
+}
+std::optional<KnotVector> v_knots_of(const Geom_BSplineSurface& surface) {
+  return knot_vector(surface.VDegree(), surface.VKnots(), surface.VMultiplicities(),
+                     surface.IsVPeriodic());
+}
+
+// The curve whose pole number i (from 1) is pole(i).
+template <int D, typename Pole>
+BSplineCurve<D> curve_of(const Geom_BSplineCurve& curve, const KnotVector& knots,
+                         const Pole& pole) {
+  Eigen::Matrix<double, D, Eigen::Dynamic> poles(D, curve.NbPoles());
+  for (int i = 1; i <= curve.NbPoles(); ++i) poles.col(i - 1) = pole(i);
+  return curve.IsPeriodic() ? periodic_curve<D>(knots, poles)
+                            : BSplineCurve<D>(knots, std::move(poles));
+}
+
+template <int D, typename Pole>
+BSplineSurface<D> surface_of(const Geom_BSplineSurface& surface, const KnotVector& u,
+                             const KnotVector& v, const Pole& pole) {
+  const int m = surface.IsUPeriodic() ? u.control_point_count() : surface.NbUPoles();
+  const int n = surface.IsVPeriodic() ? v.control_point_count() : surface.NbVPoles();
+  Eigen::Matrix<double, D, Eigen::Dynamic> net(D, static_cast<Eigen::Index>(m) * n);
+  Eigen::Index column = 0;
+  for (int i = 0; i < m; ++i) {
+    for (int j = 0; j < n; ++j) {
+      net.col(column++) = pole(i % surface.NbUPoles() + 1, j % surface.NbVPoles() + 1);
+    }
+  }
+  return BSplineSurface<D>(u, v, std::move(net));
+}
+
+Eigen::Vector4d homogeneous_point(const gp_Pnt& p, double weight) {
+  return {weight * p.X(), weight * p.Y(), weight * p.Z(), weight};
+}
 
 }  // namespace
 
 Handle(Geom_BSplineCurve) to_occt(const BSplineCurve<3>& curve) {
-  TColgp_Array1OfPnt poles(1, static_cast<int>(curve.control_points().cols()));
-  for (int i = 1; i <= poles.Length(); ++i) {
-    poles.SetValue(i, point(curve.control_points().col(i - 1)));
-  }
-  const DistinctKnots knots = distinct(curve.knots());
-  return new Geom_BSplineCurve(poles, knots.values, knots.multiplicities, curve.knots().degree());
+  const Axis along = axis(curve.knots(), is_periodic(curve));
+  TColgp_Array1OfPnt poles(1, along.poles);
+  for (int i = 0; i < along.poles; ++i) poles.SetValue(i + 1, point(curve.control_points().col(i)));
+  return new Geom_BSplineCurve(poles, along.values, along.multiplicities, curve.knots().degree(),
+                               along.periodic);
 }
 
 Handle(Geom_BSplineSurface) to_occt(const BSplineSurface<3>& surface) {
-  TColgp_Array2OfPnt poles(1, surface.u_count(), 1, surface.v_count());
-  for (int i = 0; i < surface.u_count(); ++i) {
-    for (int j = 0; j < surface.v_count(); ++j) {
+  const Axis u = axis(surface.u(), is_periodic_u(surface));
+  const Axis v = axis(surface.v(), is_periodic_v(surface));
+  TColgp_Array2OfPnt poles(1, u.poles, 1, v.poles);
+  for (int i = 0; i < u.poles; ++i) {
+    for (int j = 0; j < v.poles; ++j) {
       poles.SetValue(i + 1, j + 1, point(surface.control_point(i, j)));
     }
   }
-  const DistinctKnots u = distinct(surface.u());
-  const DistinctKnots v = distinct(surface.v());
   return new Geom_BSplineSurface(poles, u.values, v.values, u.multiplicities, v.multiplicities,
-                                 surface.u().degree(), surface.v().degree());
-}
-
-std::optional<BSplineCurve<3>> from_occt(const Geom_BSplineCurve& curve) {
-  if (curve.IsRational() || curve.IsPeriodic()) return std::nullopt;
-  std::optional<KnotVector> knots = knot_vector(curve.Degree(), curve.KnotSequence());
-  if (!knots) return std::nullopt;
-  Points3 points(3, curve.NbPoles());
-  for (int i = 1; i <= curve.NbPoles(); ++i) {
-    const gp_Pnt p = curve.Pole(i);
-    points.col(i - 1) << p.X(), p.Y(), p.Z();
-  }
-  return BSplineCurve<3>(*std::move(knots), std::move(points));
-}
-
-std::optional<BSplineSurface<3>> from_occt(const Geom_BSplineSurface& surface) {
-  if (surface.IsURational() || surface.IsVRational() || surface.IsUPeriodic() ||
-      surface.IsVPeriodic()) {
-    return std::nullopt;
-  }
-  std::optional<KnotVector> u = knot_vector(surface.UDegree(), surface.UKnotSequence());
-  std::optional<KnotVector> v = knot_vector(surface.VDegree(), surface.VKnotSequence());
-  if (!u || !v) return std::nullopt;
-  Points3 points(3, static_cast<Eigen::Index>(surface.NbUPoles()) * surface.NbVPoles());
-  Eigen::Index column = 0;
-  for (int i = 1; i <= surface.NbUPoles(); ++i) {
-    for (int j = 1; j <= surface.NbVPoles(); ++j) {
-      const gp_Pnt p = surface.Pole(i, j);
-      points.col(column++) << p.X(), p.Y(), p.Z();
-    }
-  }
-  return BSplineSurface<3>(*std::move(u), *std::move(v), std::move(points));
-}
-
-BSplineCurve<4> homogeneous_from_occt(const Geom_BSplineCurve& original) {
-  const Handle(Geom_BSplineCurve) curve = Handle(Geom_BSplineCurve)::DownCast(original.Copy());
-  curve->SetNotPeriodic();
-  const std::optional<KnotVector> knots = knot_vector(curve->Degree(), curve->KnotSequence());
-  EXPECTS(knots.has_value());
-  Eigen::Matrix4Xd points(4, curve->NbPoles());
-  for (int i = 1; i <= curve->NbPoles(); ++i) {
-    const gp_Pnt p = curve->Pole(i);
-    const double w = curve->Weight(i);
-    points.col(i - 1) << w * p.X(), w * p.Y(), w * p.Z(), w;
-  }
-  return BSplineCurve<4>(*knots, std::move(points));
-}
-
-BSplineSurface<4> homogeneous_from_occt(const Geom_BSplineSurface& original) {
-  const Handle(Geom_BSplineSurface) surface =
-      Handle(Geom_BSplineSurface)::DownCast(original.Copy());
-  surface->SetUNotPeriodic();
-  surface->SetVNotPeriodic();
-  const std::optional<KnotVector> u = knot_vector(surface->UDegree(), surface->UKnotSequence());
-  const std::optional<KnotVector> v = knot_vector(surface->VDegree(), surface->VKnotSequence());
-  EXPECTS(u.has_value() && v.has_value());
-  Eigen::Matrix4Xd points(4, static_cast<Eigen::Index>(surface->NbUPoles()) * surface->NbVPoles());
-  Eigen::Index column = 0;
-  for (int i = 1; i <= surface->NbUPoles(); ++i) {
-    for (int j = 1; j <= surface->NbVPoles(); ++j) {
-      const gp_Pnt p = surface->Pole(i, j);
-      const double w = surface->Weight(i, j);
-      points.col(column++) << w * p.X(), w * p.Y(), w * p.Z(), w;
-    }
-  }
-  return BSplineSurface<4>(*u, *v, std::move(points));
+                                 surface.u().degree(), surface.v().degree(), u.periodic,
+                                 v.periodic);
 }
 
 Handle(Geom_BSplineCurve) rational_to_occt(const BSplineCurve<4>& curve) {
-  const int count = static_cast<int>(curve.control_points().cols());
-  TColgp_Array1OfPnt poles(1, count);
-  TColStd_Array1OfReal weights(1, count);
-  for (int i = 1; i <= count; ++i) {
-    const Eigen::Vector4d h = curve.control_points().col(i - 1);
+  const Axis along = axis(curve.knots(), is_periodic(curve));
+  TColgp_Array1OfPnt poles(1, along.poles);
+  TColStd_Array1OfReal weights(1, along.poles);
+  for (int i = 0; i < along.poles; ++i) {
+    const Eigen::Vector4d h = curve.control_points().col(i);
     EXPECTS(h.w() > 0);
-    poles.SetValue(i, point(h.head<3>() / h.w()));
-    weights.SetValue(i, h.w());
+    poles.SetValue(i + 1, point(h.head<3>() / h.w()));
+    weights.SetValue(i + 1, h.w());
   }
-  const DistinctKnots knots = distinct(curve.knots());
-  return new Geom_BSplineCurve(poles, weights, knots.values, knots.multiplicities,
-                               curve.knots().degree());
+  return new Geom_BSplineCurve(poles, weights, along.values, along.multiplicities,
+                               curve.knots().degree(), along.periodic);
 }
 
 Handle(Geom_BSplineSurface) rational_to_occt(const BSplineSurface<4>& surface) {
-  TColgp_Array2OfPnt poles(1, surface.u_count(), 1, surface.v_count());
-  TColStd_Array2OfReal weights(1, surface.u_count(), 1, surface.v_count());
-  for (int i = 0; i < surface.u_count(); ++i) {
-    for (int j = 0; j < surface.v_count(); ++j) {
+  const Axis u = axis(surface.u(), is_periodic_u(surface));
+  const Axis v = axis(surface.v(), is_periodic_v(surface));
+  TColgp_Array2OfPnt poles(1, u.poles, 1, v.poles);
+  TColStd_Array2OfReal weights(1, u.poles, 1, v.poles);
+  for (int i = 0; i < u.poles; ++i) {
+    for (int j = 0; j < v.poles; ++j) {
       const Eigen::Vector4d h = surface.control_point(i, j);
       EXPECTS(h.w() > 0);
       poles.SetValue(i + 1, j + 1, point(h.head<3>() / h.w()));
       weights.SetValue(i + 1, j + 1, h.w());
     }
   }
-  const DistinctKnots u = distinct(surface.u());
-  const DistinctKnots v = distinct(surface.v());
   return new Geom_BSplineSurface(poles, weights, u.values, v.values, u.multiplicities,
-                                 v.multiplicities, surface.u().degree(), surface.v().degree());
+                                 v.multiplicities, surface.u().degree(), surface.v().degree(),
+                                 u.periodic, v.periodic);
 }
 
-// OpenCASCADE counts poles from the knot span that starts the period: its pole 1 is the function
-// whose support ends that span when the first knot has multiplicity 1, and each further copy moves
-// it on.
-Handle(Geom_BSplineCurve) periodic_to_occt(const BSplineCurve<3>& curve) {
-  EXPECTS(is_periodic(curve));
-  const int count = *periodic_count(curve.knots());
-  std::vector<Knot> period;
-  for (const Knot& knot : distinct_knots(curve.knots())) {
-    if (knot.value >= curve.knots().first() && knot.value <= curve.knots().last()) {
-      period.push_back(knot);
-    }
-  }
-  period.front().multiplicity = period.back().multiplicity =
-      std::max(period.front().multiplicity, period.back().multiplicity);
-  TColStd_Array1OfReal values(1, static_cast<int>(period.size()));
-  TColStd_Array1OfInteger multiplicities(1, static_cast<int>(period.size()));
-  for (int i = 1; i <= values.Length(); ++i) {
-    values.SetValue(i, period[static_cast<std::size_t>(i) - 1].value);
-    multiplicities.SetValue(i, period[static_cast<std::size_t>(i) - 1].multiplicity);
-  }
-  TColgp_Array1OfPnt poles(1, count);
-  for (int i = 0; i < count; ++i) poles.SetValue(i + 1, point(curve.control_points().col(i)));
-  return new Geom_BSplineCurve(poles, values, multiplicities, curve.knots().degree(), true);
+std::optional<BSplineCurve<3>> from_occt(const Geom_BSplineCurve& curve) {
+  const std::optional<KnotVector> knots = knots_of(curve);
+  if (!knots || curve.IsRational()) return std::nullopt;
+  return curve_of<3>(curve, *knots, [&](int i) { return vector(curve.Pole(i)); });
+}
+
+std::optional<BSplineSurface<3>> from_occt(const Geom_BSplineSurface& surface) {
+  const std::optional<KnotVector> u = u_knots_of(surface);
+  const std::optional<KnotVector> v = v_knots_of(surface);
+  if (!u || !v || surface.IsURational() || surface.IsVRational()) return std::nullopt;
+  return surface_of<3>(surface, *u, *v, [&](int i, int j) { return vector(surface.Pole(i, j)); });
+}
+
+BSplineCurve<4> homogeneous_from_occt(const Geom_BSplineCurve& curve) {
+  const std::optional<KnotVector> knots = knots_of(curve);
+  EXPECTS(knots.has_value());
+  return curve_of<4>(curve, *knots,
+                     [&](int i) { return homogeneous_point(curve.Pole(i), curve.Weight(i)); });
+}
+
+BSplineSurface<4> homogeneous_from_occt(const Geom_BSplineSurface& surface) {
+  const std::optional<KnotVector> u = u_knots_of(surface);
+  const std::optional<KnotVector> v = v_knots_of(surface);
+  EXPECTS(u.has_value() && v.has_value());
+  return surface_of<4>(surface, *u, *v, [&](int i, int j) {
+    return homogeneous_point(surface.Pole(i, j), surface.Weight(i, j));
+  });
 }
 
 }  // namespace angiospline

@@ -149,7 +149,8 @@ class BoundaryBuilder {
     auto spline = Handle(Geom_BSplineCurve)::DownCast(curve);
     if (!spline.IsNull()) {
       result.breaks = breaks_of(spline->Knots(), result.from, result.to);
-      if (auto own = from_occt(*spline); own && place.IsIdentity()) {
+      // Parameters may run over the seam of a periodic one.
+      if (auto own = from_occt(*spline); own && !spline->IsPeriodic() && place.IsIdentity()) {
         result.point = edge_points(*std::move(own));
         return;
       }
@@ -203,7 +204,7 @@ class BoundaryBuilder {
     const gp_Trsf trsf = place.Transformation();
     if (place.IsIdentity()) {
       const auto spline = Handle(Geom_BSplineSurface)::DownCast(surface);
-      if (!spline.IsNull()) {
+      if (!spline.IsNull() && !spline->IsUPeriodic() && !spline->IsVPeriodic()) {
         if (auto own = from_occt(*spline)) {
           face.patch = std::make_shared<BSplineSurface<3>>(*std::move(own));
         }
