@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -12,101 +11,17 @@
 #include <fmt/format.h>
 
 #include "base/result.h"
-#include "recovery/image.h"
+#include "recovery/growing_labels.h"
 #include "recovery/region_growing.h"
 
 namespace angiospline::region_growing {
 
 constexpr int kMaxNeighbourhood = 15;
 
-// One bit a voxel, rows padded to whole words, so that the labels of a row of a neighbourhood come
-// with one or two loads.
-class BitVolume {
- public:
-  explicit BitVolume(const Voxel& size)
-      : words_per_row_((static_cast<std::size_t>(size[0]) + 63) / 64 + 1),
-        rows_(static_cast<std::size_t>(size[1])),
-        words_(words_per_row_ * rows_ * static_cast<std::size_t>(size[2])) {}
-
-  bool test(int x, int y, int z) const { return (word(x, y, z) >> (x & 63)) & 1U; }
-  void set(int x, int y, int z) {
-    words_[row(y, z) + static_cast<std::size_t>(x >> 6)] |= std::uint64_t{1} << (x & 63);
-  }
-  // f(voxel) for every bit set, x fastest.
-  template <typename F>
-  void for_each_set(F&& f) const {
-    for (std::size_t w = 0; w < words_.size(); ++w)
-      for (std::uint64_t bits = words_[w]; bits != 0; bits &= bits - 1) {
-        const std::size_t at = w / words_per_row_;
-        f(Voxel{static_cast<int>(w % words_per_row_) * 64 + std::countr_zero(bits),
-                static_cast<int>(at % rows_), static_cast<int>(at / rows_)});
-      }
-  }
-  // Bits of `count` voxels from x on, the first in bit 0; count <= 32.
-  std::uint32_t run(int x, int y, int z, int count) const {
-    const std::size_t w = row(y, z) + static_cast<std::size_t>(x >> 6);
-    const int shift = x & 63;
-    std::uint64_t bits = words_[w] >> shift;
-    if (shift + count > 64) bits |= words_[w + 1] << (64 - shift);
-    return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << count) - 1));
-  }
-
- private:
-  std::size_t row(int y, int z) const {
-    return words_per_row_ * (static_cast<std::size_t>(y) + rows_ * static_cast<std::size_t>(z));
-  }
-  std::uint64_t word(int x, int y, int z) const {
-    return words_[row(y, z) + static_cast<std::size_t>(x >> 6)];
-  }
-
-  std::size_t words_per_row_;
-  std::size_t rows_;
-  std::vector<std::uint64_t> words_;
-};
-
-struct Box {
-  Voxel low, high;  // both inside the image
-};
-
-template <typename F>
-void for_each(const Box& box, F&& f) {
-  for (int z = box.low[2]; z <= box.high[2]; ++z)
-    for (int y = box.low[1]; y <= box.high[1]; ++y)
-      for (int x = box.low[0]; x <= box.high[0]; ++x) f(Voxel{x, y, z});
-}
-
-// The cube of edge 2 half + 1 around c, as far as it lies in the image.
-inline Box box_around(const Voxel& c, int half, const Voxel& size) {
-  Box box;
-  for (std::size_t i = 0; i < 3; ++i) {
-    box.low[i] = std::max(0, c[i] - half);
-    box.high[i] = std::min(size[i] - 1, c[i] + half);
-  }
-  return box;
-}
-
 inline Voxel nearest_voxel(const Vec3& index_vox) {
   return {static_cast<int>(std::lround(index_vox[0])), static_cast<int>(std::lround(index_vox[1])),
           static_cast<int>(std::lround(index_vox[2]))};
 }
-
-// Mean and standard deviation from sums about a reference value, so that equal values give exactly
-// zero deviation.
-struct Moments {
-  std::size_t count = 0;
-  double sum = 0, sum_of_squares = 0;
-
-  void add(double difference) {
-    ++count;
-    sum += difference;
-    sum_of_squares += difference * difference;
-  }
-  double mean() const { return sum / static_cast<double>(count); }
-  double deviation() const {
-    const double m = mean();
-    return std::sqrt(std::max(0.0, sum_of_squares / static_cast<double>(count) - m * m));
-  }
-};
 
 struct Decision {
   bool vessel;
@@ -123,21 +38,22 @@ class AdaptiveThreshold {
   // Keeps references to both; the image's values may change between calls.
   AdaptiveThreshold(const Image<T>& image, const GrowOptions& options)
       : image_(image),
+        values_(image, options.smoothing_mm),
         options_(options),
         size_(image.grid.size),
         sign_(options.polarity == Polarity::kBright ? 1.0 : -1.0),
         floor_(options.background ? sign_ * *options.background
                                   : -std::numeric_limits<double>::infinity()),
         half_(options.neighbourhood_vox / 2),
-        vessel_(size_),
-        background_(size_) {}
+        labels_(size_),
+        labelled_(size_, half_) {}
 
   double sign() const { return sign_; }
   double floor() const { return floor_; }
 
   // Grey value with vessels bright; not-a-number counts as darker than anything.
   double grey(const Voxel& v) const {
-    const double value = static_cast<double>(image_[v]);
+    const double value = static_cast<double>(values_.at(v));
     if constexpr (std::is_floating_point_v<T>)
       if (!std::isfinite(value)) return -std::numeric_limits<double>::infinity();
     return sign_ * value;
@@ -146,13 +62,21 @@ class AdaptiveThreshold {
     return g >= fading * floor_ && std::isfinite(g);
   }
 
-  bool is_vessel(const Voxel& v) const { return vessel_.test(v[0], v[1], v[2]); }
+  bool is_vessel(const Voxel& v) const { return labels_.any(v, VoxelFlags::kVessel); }
   template <typename F>
   void for_each_vessel(F&& f) const {
-    vessel_.for_each_set(f);
+    labels_.for_each_with(VoxelFlags::kVessel, f);
   }
-  void label_vessel(const Voxel& v) { vessel_.set(v[0], v[1], v[2]); }
-  void label_background(const Voxel& v) { background_.set(v[0], v[1], v[2]); }
+  // The voxel's grey value must not change any more.
+  void label_vessel(const Voxel& v) {
+    if (is_vessel(v)) return;
+    labels_.set(v, VoxelFlags::kVessel | VoxelFlags::kSeen);
+    if (const double g = grey(v); std::isfinite(g)) labelled_.add(v, g);
+  }
+  void label_background(const Voxel& v) { labels_.set(v, VoxelFlags::kBackground); }
+  // A mark for the caller's use; a label of vessel sets it too.
+  bool is_seen(const Voxel& v) const { return labels_.any(v, VoxelFlags::kSeen); }
+  void mark_seen(const Voxel& v) { labels_.set(v, VoxelFlags::kSeen); }
 
   Decision decide(const Voxel& v) const;
 
@@ -166,18 +90,18 @@ class AdaptiveThreshold {
 
  private:
   Voxel brightest_near(const Voxel& v) const;
-  Moments labelled_around(const Box& box, double reference) const;
   double fading(double s1_mean, std::size_t s1_count, const Box& box) const;
   double mean_of_brightest_connected(const Voxel& c, const Box& box) const;
 
   const Image<T>& image_;
+  GreyValues<T> values_;
   const GrowOptions& options_;
   Voxel size_;
   double sign_;
   double floor_;
   int half_;
-  BitVolume vessel_;
-  BitVolume background_;  // compared and found dark; a later label of vessel overrules it
+  VoxelFlags labels_;  // background: compared and found dark; a later label of vessel overrules it
+  LabelledMoments labelled_;
 };
 
 template <typename T>
@@ -187,22 +111,6 @@ Voxel AdaptiveThreshold<T>::brightest_near(const Voxel& v) const {
     if (grey(u) > grey(best)) best = u;
   });
   return best;
-}
-
-template <typename T>
-Moments AdaptiveThreshold<T>::labelled_around(const Box& box, double reference) const {
-  Moments s;
-  const int width = box.high[0] - box.low[0] + 1;
-  for (int z = box.low[2]; z <= box.high[2]; ++z)
-    for (int y = box.low[1]; y <= box.high[1]; ++y) {
-      std::uint32_t bits = vessel_.run(box.low[0], y, z, width);
-      const std::size_t row = image_.grid.offset({box.low[0], y, z});
-      for (; bits != 0; bits &= bits - 1)
-        s.add(sign_ * static_cast<double>(
-                          image_.voxels[row + static_cast<std::size_t>(std::countr_zero(bits))]) -
-              reference);
-    }
-  return s;
 }
 
 // S2: from the candidate on, always the brightest unlabelled voxel that touches the set (ties: the
@@ -235,7 +143,9 @@ double AdaptiveThreshold<T>::mean_of_brightest_connected(const Voxel& c, const B
       for (int y = std::max(last[1] - 1, box.low[1]); y <= std::min(last[1] + 1, box.high[1]); ++y)
         for (int x = std::max(last[0] - 1, box.low[0]); x <= std::min(last[0] + 1, box.high[0]);
              ++x) {
-          if (vessel_.test(x, y, z) || background_.test(x, y, z) || !mark({x, y, z})) continue;
+          if (labels_.any({x, y, z}, VoxelFlags::kVessel | VoxelFlags::kBackground) ||
+              !mark({x, y, z}))
+            continue;
           const double g = grey({x, y, z});
           if (std::isfinite(g)) rim[rim_count++] = {g, {x, y, z}};
         }
@@ -271,9 +181,9 @@ template <typename T>
 Decision AdaptiveThreshold<T>::decide(const Voxel& v) const {
   const Box box = box_around(v, half_, size_);
   const double here = grey(v);
-  const Moments s1 = labelled_around(box, here);
+  const Moments s1 = labelled_.around(v, box);
   if (s1.count == 0) return {false, std::numeric_limits<double>::infinity()};
-  const double mean = here + s1.mean();
+  const double mean = labelled_.reference() + s1.mean();
   const double threshold = mean - options_.deviations * s1.deviation();
   const double faded = fading(mean, s1.count, box);
   if (options_.background_level) {

@@ -8,8 +8,6 @@
 #include <fmt/format.h>
 
 #include "recovery/deform_experiments_tables.h"
-#include "recovery/phantom.h"
-#include "recovery/region_growing.h"
 
 namespace angiospline {
 namespace experiments {
@@ -44,51 +42,6 @@ std::string listed(const std::vector<double>& values, int digits) {
   return text;
 }
 
-Result<ReproducedTable> region_growing(const ReproduceOptions& options, const Progress& progress) {
-  PhantomOptions image;
-  image.snr = 20;
-  image.loss_deg = 12;
-  image.seed = options.seed;
-  const auto phantom = make_phantom(PhantomKind::kRings, image);
-  if (!phantom) return fail(phantom.error());
-  struct Case {
-    int N;
-    double M, thesis;
-  };
-  std::vector<Case> cases = {{5, 2, 1101}, {5, 3, 1120},  {5, 4, 5916},  {7, 2, 1081},
-                             {7, 3, 2050}, {7, 4, 10172}, {9, 2, 1084},  {9, 3, 1115},
-                             {9, 4, 1129}, {11, 2, 965},  {11, 3, 1114}, {11, 4, 1131}};
-  if (options.quick) cases.resize(3);
-  ReproducedTable t;
-  t.columns = {"segmented points"};
-  const Vec3 seed = phantom_rings()[0].at(0.39);  // midway between two losses
-  int more_with_m = 0, pairs_m = 0, fewer_with_n = 0, pairs_n = 0;
-  for (std::size_t k = 0; k < cases.size(); ++k) {
-    GrowOptions grow;
-    grow.neighbourhood_vox = cases[k].N;
-    grow.deviations = cases[k].M;
-    grow.max_examined = 200000;
-    const auto grown = grow_region(phantom->image, {seed}, grow, progress);
-    if (!grown) return fail(grown.error());
-    const auto points = static_cast<double>(grown->report.voxels);
-    t.rows.push_back(
-        {fmt::format("N {:2} M {}", cases[k].N, cases[k].M), {{cases[k].thesis, points}}});
-    const auto ours = [&](std::size_t i) { return *t.rows[i].figures[0].ours; };
-    if (k % 3 != 0) ++pairs_m, more_with_m += points >= ours(k - 1);
-    if (k >= 3) ++pairs_n, fewer_with_n += points <= 1.02 * ours(k - 3);
-    progress.at("table 7.1", static_cast<double>(k + 1) / static_cast<double>(cases.size()));
-  }
-  t.trends.push_back({"more deviations M segment more points", more_with_m == pairs_m,
-                      fmt::format("{} of {} pairs", more_with_m, pairs_m)});
-  if (pairs_n > 0)
-    t.trends.push_back({"larger neighbourhoods N segment no more points, with one exception",
-                        fewer_with_n + 1 >= pairs_n,
-                        fmt::format("{} of {} pairs", fewer_with_n, pairs_n)});
-  t.notes.push_back(
-      "rings of tube radius 4 mm with 12 degrees of lost signal every 45, SNR 20; one seed");
-  return t;
-}
-
 namespace {
 
 struct Entry {
@@ -100,6 +53,7 @@ struct Entry {
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = {
       {"7.1", "region growing: points by neighbourhood N and deviations M", region_growing},
+      {"rings", "growing in a volume and four X-ray views (7.1.1)", two_modalities},
       {"7.2", "gravity: iterations and missed points by method and strength",
        methods_and_strengths},
       {"7.3", "gravity and springs", gravity_and_springs},

@@ -7,6 +7,7 @@
 namespace angiospline::experiments {
 
 Result<ReproducedTable> region_growing(const ReproduceOptions& options, const Progress& progress);
+Result<ReproducedTable> two_modalities(const ReproduceOptions& options, const Progress& progress);
 
 Result<ReproducedTable> methods_and_strengths(const ReproduceOptions&, const Progress&);  // 7.2
 Result<ReproducedTable> gravity_and_springs(const ReproduceOptions&, const Progress&);    // 7.3

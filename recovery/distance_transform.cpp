@@ -227,6 +227,11 @@ double ForegroundDistances::at_mm(std::size_t offset) const {
   return static_cast<double>(values_[run->first + static_cast<std::size_t>(v[0] - run->begin)]);
 }
 
+double ForegroundDistances::largest_mm() const {
+  const auto most = std::max_element(values_.begin(), values_.end());
+  return most == values_.end() ? 0.0 : static_cast<double>(*most);
+}
+
 Image<float> ForegroundDistances::image() const {
   Image<float> image(grid_);
   for (int z = 0; z < grid_.size[2]; ++z)

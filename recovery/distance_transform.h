@@ -21,6 +21,7 @@ class ForegroundDistances {
 
   double at_mm(std::size_t offset) const;  // requires a foreground voxel of the mask
   Image<float> image() const;              // with 0 in the background
+  double largest_mm() const;               // 0 if there is no foreground
 
  private:
   struct Run {

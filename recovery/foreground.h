@@ -24,6 +24,17 @@ inline std::size_t next_foreground(const std::uint8_t* values, std::size_t from,
   return from;
 }
 
+// Where the foreground of a row along x lies: its first column, and the one after its last; both 0
+// if it has none.
+struct RowExtent {
+  int begin = 0, end = 0;
+  bool empty() const { return end == 0; }
+};
+
+// Of every row, y fastest. One pass over the image; what follows the foreground can then pass over
+// the rest of it.
+std::vector<RowExtent> row_extents(const Mask& mask);
+
 // Offsets of all foreground voxels, in growing order. One pass over the image.
 std::vector<std::size_t> foreground_offsets(const Mask& mask);
 

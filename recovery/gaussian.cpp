@@ -108,6 +108,8 @@ template <typename T>
 T rounded(float x) {
   if constexpr (std::is_floating_point_v<T>)
     return static_cast<T>(x);
+  else if constexpr (sizeof(T) <= 2)  // what lround gives for the values there are, and faster
+    return static_cast<T>(static_cast<int>(x + std::copysign(0.5F, x)));
   else
     return static_cast<T>(std::lround(x));
 }
@@ -131,23 +133,61 @@ void convolve(const Image<T>& image, const std::array<std::vector<float>, 3>& ke
   }
 }
 
+std::array<std::vector<float>, 3> kernels_of(const ImageGrid& grid, double sigma_mm) {
+  std::array<std::vector<float>, 3> kernels;
+  for (std::size_t i = 0; i < 3; ++i)
+    kernels[i] = half_kernel(
+        grid.size[i] > 1 ? sigma_mm / grid.spacing_mm[static_cast<Eigen::Index>(i)] : 0);
+  return kernels;
+}
+
+template <typename T>
+bool is_finite(T v) {
+  if constexpr (std::is_floating_point_v<T>)
+    return std::isfinite(v);
+  else
+    return true;
+}
+
+// A box of float values, and what convolving it without a border leaves of it.
+struct Block {
+  Voxel size;
+  std::vector<float> values;
+};
+
+// Along one axis, whose extent falls by twice the kernel's reach. The same sums in the same order
+// as convolve_row and combine_rows.
+Block convolved(const Block& in, std::size_t axis, const std::vector<float>& kernel) {
+  const auto reach = kernel.size() - 1;
+  Block out{in.size, {}};
+  out.size[axis] -= 2 * static_cast<int>(reach);
+  const auto nx = static_cast<std::size_t>(in.size[0]), ny = static_cast<std::size_t>(in.size[1]);
+  const std::size_t stride = axis == 0 ? 1 : axis == 1 ? nx : nx * ny;
+  const auto width = static_cast<std::size_t>(out.size[0]);
+  out.values.resize(width * static_cast<std::size_t>(out.size[1]) *
+                    static_cast<std::size_t>(out.size[2]));
+  float* to = out.values.data();
+  for (std::size_t z = 0; z < static_cast<std::size_t>(out.size[2]); ++z)
+    for (std::size_t y = 0; y < static_cast<std::size_t>(out.size[1]); ++y, to += width) {
+      const float* centre = in.values.data() + nx * (y + ny * z) + reach * stride;
+      for (std::size_t x = 0; x < width; ++x) to[x] = kernel[0] * centre[x];
+      for (std::size_t k = 1; k <= reach; ++k) {
+        const float w = kernel[k];
+        const float *before = centre - k * stride, *after = centre + k * stride;
+        for (std::size_t x = 0; x < width; ++x) to[x] += w * (before[x] + after[x]);
+      }
+    }
+  return out;
+}
+
 }  // namespace
 
 template <typename T>
 Image<T> smoothed(Image<T> image, double sigma_mm) {
   EXPECTS(sigma_mm >= 0);
   if (sigma_mm == 0 || image.voxels.empty()) return image;
-  std::array<std::vector<float>, 3> kernels;
-  for (int i = 0; i < 3; ++i)
-    kernels[static_cast<std::size_t>(i)] = half_kernel(
-        image.grid.size[static_cast<std::size_t>(i)] > 1 ? sigma_mm / image.grid.spacing_mm[i] : 0);
-  const auto finite = [](T v) {
-    if constexpr (std::is_floating_point_v<T>)
-      return std::isfinite(v);
-    else
-      return true;
-  };
-  if (std::all_of(image.voxels.begin(), image.voxels.end(), finite)) {
+  const std::array<std::vector<float>, 3> kernels = kernels_of(image.grid, sigma_mm);
+  if (std::all_of(image.voxels.begin(), image.voxels.end(), is_finite<T>)) {
     convolve(
         image, kernels, [](T v) { return static_cast<float>(v); },
         [&](std::size_t first, const std::vector<float>& row) {
@@ -160,19 +200,80 @@ Image<T> smoothed(Image<T> image, double sigma_mm) {
   // divides the sum over them.
   Image<float> share(image.grid);
   convolve(
-      image, kernels, [&](T v) { return finite(v) ? 1.0F : 0.0F; },
+      image, kernels, [](T v) { return is_finite(v) ? 1.0F : 0.0F; },
       [&](std::size_t first, const std::vector<float>& row) {
         std::copy(row.begin(), row.end(),
                   share.voxels.begin() + static_cast<std::ptrdiff_t>(first));
       });
   convolve(
-      image, kernels, [&](T v) { return finite(v) ? static_cast<float>(v) : 0.0F; },
+      image, kernels, [](T v) { return is_finite(v) ? static_cast<float>(v) : 0.0F; },
       [&](std::size_t first, const std::vector<float>& row) {
         for (std::size_t x = 0; x < row.size(); ++x)
-          if (finite(image.voxels[first + x]))
+          if (is_finite(image.voxels[first + x]))
             image.voxels[first + x] = rounded<T>(row[x] / share.voxels[first + x]);
       });
   return image;
+}
+
+template <typename T>
+Image<T> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high, double sigma_mm) {
+  EXPECTS(sigma_mm >= 0 && image.grid.contains(low) && image.grid.contains(high));
+  const auto kernels = kernels_of(image.grid, sigma_mm);
+  ImageGrid grid = image.grid;
+  Block values, share;
+  Voxel first;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const int reach = sigma_mm > 0 ? static_cast<int>(kernels[k].size()) - 1 : 0;
+    grid.size[k] = high[k] - low[k] + 1;
+    values.size[k] = grid.size[k] + 2 * reach;
+    first[k] = low[k] - reach;
+  }
+  grid.origin_mm = image.grid.world_mm(low);
+  Image<T> out(grid);
+  // The border's value goes on beyond the border.
+  const auto at = [&](int x, int y, int z) {
+    return image[{std::clamp(first[0] + x, 0, image.grid.size[0] - 1),
+                  std::clamp(first[1] + y, 0, image.grid.size[1] - 1),
+                  std::clamp(first[2] + z, 0, image.grid.size[2] - 1)}];
+  };
+  bool all_finite = true;
+  values.values.reserve(static_cast<std::size_t>(values.size[0]) *
+                        static_cast<std::size_t>(values.size[1]) *
+                        static_cast<std::size_t>(values.size[2]));
+  for (int z = 0; z < values.size[2]; ++z)
+    for (int y = 0; y < values.size[1]; ++y)
+      for (int x = 0; x < values.size[0]; ++x) {
+        const T v = at(x, y, z);
+        if (sigma_mm == 0) {
+          out[{x, y, z}] = v;
+          continue;
+        }
+        all_finite = all_finite && is_finite(v);
+        values.values.push_back(is_finite(v) ? static_cast<float>(v) : 0.0F);
+        if constexpr (std::is_floating_point_v<T>)
+          share.values.push_back(is_finite(v) ? 1.0F : 0.0F);
+      }
+  if (sigma_mm == 0) return out;
+  share.size = values.size;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    values = convolved(values, axis, kernels[axis]);
+    if (!all_finite) share = convolved(share, axis, kernels[axis]);
+  }
+  for (std::size_t i = 0; i < out.voxels.size(); ++i) {
+    if (all_finite) {
+      out.voxels[i] = rounded<T>(values.values[i]);
+      continue;
+    }
+    const Voxel v = grid.voxel(i);
+    const T own = image[{low[0] + v[0], low[1] + v[1], low[2] + v[2]}];
+    out.voxels[i] = is_finite(own) ? rounded<T>(values.values[i] / share.values[i]) : own;
+  }
+  return out;
+}
+
+AnyImage smoothed_box(const AnyImage& image, const Voxel& low, const Voxel& high, double sigma_mm) {
+  return std::visit([&](const auto& i) { return AnyImage(smoothed_box(i, low, high, sigma_mm)); },
+                    image);
 }
 
 AnyImage smoothed(AnyImage image, double sigma_mm) {
@@ -180,13 +281,17 @@ AnyImage smoothed(AnyImage image, double sigma_mm) {
                     std::move(image));
 }
 
-template Image<std::uint8_t> smoothed(Image<std::uint8_t>, double);
-template Image<std::int8_t> smoothed(Image<std::int8_t>, double);
-template Image<std::uint16_t> smoothed(Image<std::uint16_t>, double);
-template Image<std::int16_t> smoothed(Image<std::int16_t>, double);
-template Image<std::uint32_t> smoothed(Image<std::uint32_t>, double);
-template Image<std::int32_t> smoothed(Image<std::int32_t>, double);
-template Image<float> smoothed(Image<float>, double);
-template Image<double> smoothed(Image<double>, double);
+#define ANGIOSPLINE_INSTANTIATE(T)              \
+  template Image<T> smoothed(Image<T>, double); \
+  template Image<T> smoothed_box(const Image<T>&, const Voxel&, const Voxel&, double);
+ANGIOSPLINE_INSTANTIATE(std::uint8_t)
+ANGIOSPLINE_INSTANTIATE(std::int8_t)
+ANGIOSPLINE_INSTANTIATE(std::uint16_t)
+ANGIOSPLINE_INSTANTIATE(std::int16_t)
+ANGIOSPLINE_INSTANTIATE(std::uint32_t)
+ANGIOSPLINE_INSTANTIATE(std::int32_t)
+ANGIOSPLINE_INSTANTIATE(float)
+ANGIOSPLINE_INSTANTIATE(double)
+#undef ANGIOSPLINE_INSTANTIATE
 
 }  // namespace angiospline

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <numeric>
 
+#include "recovery/foreground.h"
+
 namespace angiospline {
 namespace {
 
@@ -97,6 +99,7 @@ class RunComponents {
     }
     return k;
   }
+  void add_row(const std::uint8_t* values, int width, const RowExtent& extent, bool foreground);
   void join_rows(std::size_t a, std::size_t b, int reach);
   void number(const ImageGrid& grid);
 
@@ -106,6 +109,24 @@ class RunComponents {
   std::vector<int> parent_;
   std::vector<Component> list_;
 };
+
+void RunComponents::add_row(const std::uint8_t* values, int width, const RowExtent& extent,
+                            bool foreground) {
+  const auto add = [&](int begin, int end) {
+    if (begin < end) runs_.push_back({begin, end, static_cast<int>(runs_.size())});
+  };
+  if (!foreground) add(0, extent.empty() ? width : extent.begin);
+  for (int x = extent.begin; x < extent.end;) {
+    const int gap = end_of_stretch(values, x, extent.end, true);
+    const int next = end_of_stretch(values, gap, extent.end, false);
+    if (foreground)
+      add(x, gap);
+    else if (next < extent.end)
+      add(gap, next);
+    x = next;
+  }
+  if (!foreground && !extent.empty()) add(extent.end, width);
+}
 
 // Joins runs of two rows that overlap when one is widened by `reach`.
 void RunComponents::join_rows(std::size_t a, std::size_t b, int reach) {
@@ -129,13 +150,9 @@ RunComponents::RunComponents(const Mask& mask, bool foreground, Neighbours neigh
   const auto rows = static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]);
   row_begin_.reserve(rows + 1);
   row_begin_.push_back(0);
+  const std::vector<RowExtent> extents = row_extents(mask);
   for (std::size_t row = 0; row < rows; ++row) {
-    const std::uint8_t* v = mask.voxels.data() + row * width_;
-    for (int x = end_of_stretch(v, 0, n[0], !foreground); x < n[0];) {
-      const int end = end_of_stretch(v, x, n[0], foreground);
-      runs_.push_back({x, end, static_cast<int>(runs_.size())});
-      x = end_of_stretch(v, end, n[0], !foreground);
-    }
+    add_row(mask.voxels.data() + row * width_, n[0], extents[row], foreground);
     row_begin_.push_back(runs_.size());
   }
   parent_.resize(runs_.size());
@@ -188,26 +205,24 @@ Mask kept(const Mask& mask, const RunComponents& components, Keep&& keep) {
   return out;
 }
 
-// The background region of `start` within its slice across `axis`, 4-connected; empty if it has
-// more than `largest` voxels or reaches the edge of the slice. Cost bounded by `largest`.
-std::vector<std::size_t> enclosed_region(const Mask& mask, const Voxel& start, std::size_t axis,
-                                         std::size_t largest) {
-  std::vector<Voxel> region{start};
+// The background region of `start` within its slice across `axis`, 4-connected, into `region`;
+// empty if it has more than `largest` voxels or reaches the edge of the slice. Cost bounded by
+// `largest`.
+void find_enclosed_region(const Mask& mask, const Voxel& start, std::size_t axis,
+                          std::size_t largest, std::vector<Voxel>& region) {
+  region.assign(1, start);
   for (std::size_t k = 0; k < region.size(); ++k)
     for (std::size_t i = 0; i < 3; ++i) {
       if (i == axis) continue;
       for (const int step : {-1, 1}) {
         Voxel n = region[k];
         n[i] += step;
-        if (!mask.grid.contains(n)) return {};
+        if (!mask.grid.contains(n)) return region.clear();
         if (mask[n] != 0 || std::find(region.begin(), region.end(), n) != region.end()) continue;
-        if (region.size() == largest) return {};
+        if (region.size() == largest) return region.clear();
         region.push_back(n);
       }
     }
-  std::vector<std::size_t> offsets;
-  for (const Voxel& v : region) offsets.push_back(mask.grid.offset(v));
-  return offsets;
 }
 
 // Background voxels with a foreground voxel across a face, each once, in order.
@@ -283,15 +298,17 @@ Filled fill_cavities(Mask mask, std::size_t largest) {
 Filled fill_holes(Mask mask, std::size_t largest) {
   Filled out;
   std::vector<std::size_t> holes;
+  std::vector<Voxel> region;
   if (largest > 0)
     for (const std::size_t at : outer_rim(mask))
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::vector<std::size_t> region =
-            enclosed_region(mask, mask.grid.voxel(at), axis, largest);
+        find_enclosed_region(mask, mask.grid.voxel(at), axis, largest, region);
         // Found again from each of its voxels on the rim; all are, so the lowest speaks for it.
-        if (region.empty() || *std::min_element(region.begin(), region.end()) != at) continue;
+        const bool lowest = std::all_of(region.begin(), region.end(),
+                                        [&](const Voxel& v) { return mask.grid.offset(v) >= at; });
+        if (region.empty() || !lowest) continue;
         ++out.regions;
-        holes.insert(holes.end(), region.begin(), region.end());
+        for (const Voxel& v : region) holes.push_back(mask.grid.offset(v));
       }
   for (const std::size_t at : holes) {
     out.voxels += mask.voxels[at] == 0;

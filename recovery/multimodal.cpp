@@ -91,7 +91,7 @@ class Grower {
   const MultimodalOptions& options_;
   std::vector<Channel> channels_;  // the volume first, if there is one
   bool has_volume_ = false;
-  BitVolume seen_;
+  VoxelFlags seen_;
   Mask mask_;
   std::priority_queue<Candidate, std::vector<Candidate>, LaterInQueue> queue_;
   std::uint64_t order_ = 0;
@@ -117,16 +117,16 @@ double Grower::brightness(const Vec3& point_mm) const {
 void Grower::label(const Voxel& v) {
   if (mask_[v] == 0) ++report_.voxels;
   mask_[v] = 1;
-  seen_.set(v[0], v[1], v[2]);
+  seen_.set(v, VoxelFlags::kSeen);
 }
 
 void Grower::queue_neighbours(const Voxel& v) {
   const std::size_t parent = world_.offset(v);
   for_each(box_around(v, 1, world_.size), [&](const Voxel& n) {
-    if (seen_.test(n[0], n[1], n[2])) return;
+    if (seen_.any(n, VoxelFlags::kSeen)) return;
     const double g = brightness(world_.world_mm(n));
     if (!std::isfinite(g)) return;
-    seen_.set(n[0], n[1], n[2]);
+    seen_.set(n, VoxelFlags::kSeen);
     queue_.push({g, order_++, world_.offset(n), parent});
   });
 }
@@ -204,12 +204,26 @@ Result<MultimodalReport> Grower::grow(const Progress& progress) {
 
 }  // namespace
 
+ImageGrid finer_grid(const ImageGrid& grid, double spacing_mm) {
+  EXPECTS(spacing_mm > 0);
+  ImageGrid fine = grid;
+  fine.spacing_mm = Vec3::Constant(spacing_mm);
+  for (std::size_t k = 0; k < 3; ++k)
+    fine.size[k] = std::max(
+        1, static_cast<int>(std::lround(
+               grid.size[k] * grid.spacing_mm[static_cast<Eigen::Index>(k)] / spacing_mm)));
+  fine.origin_mm = grid.world_mm(
+      Vec3(-0.5 * Vec3::Ones() + 0.5 * fine.spacing_mm.cwiseQuotient(grid.spacing_mm)));
+  return fine;
+}
+
 Result<MultimodalSegmentation> grow_region(Modalities modalities, const ImageGrid& world,
                                            const std::vector<Vec3>& seeds_mm,
                                            const MultimodalOptions& options,
                                            const Progress& progress) {
   for (const GrowOptions* o : {&options.volume, &options.projection})
     if (const auto ok = check(*o); !ok) return fail(ok.error());
+  EXPECTS(options.volume.smoothing_mm == 0 && options.projection.smoothing_mm == 0);
   if (!modalities.volume && modalities.views.empty())
     return fail({ErrorKind::kBadInput, "no image", {}, {}, "a volume or a projection is needed"});
   if (seeds_mm.empty())

@@ -40,6 +40,9 @@ struct MultimodalSegmentation {
   MultimodalReport report;
 };
 
+// A grid over the same field of view with cubic voxels of this edge; requires spacing_mm > 0.
+ImageGrid finer_grid(const ImageGrid& grid, double spacing_mm);
+
 // The vessels at the seeds, on `world`, whose voxels should be smaller than those of all images. A
 // priority queue hands out the candidate that is brightest in the volume (without a volume: whose
 // darkest view is brightest). The candidate is projected into each image, and there the rule of

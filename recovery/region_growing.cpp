@@ -26,6 +26,8 @@ Result<void> check(const GrowOptions& o) {
   if (!(o.deviations >= 0) || !std::isfinite(o.deviations))
     return bad("number of standard deviations M is not usable", fmt::format("{}", o.deviations),
                "M is 0 or more");
+  if (!(o.smoothing_mm >= 0) || !std::isfinite(o.smoothing_mm))
+    return bad("smoothing is not usable", fmt::format("{} mm", o.smoothing_mm), "0 or more");
   return {};
 }
 
@@ -48,7 +50,7 @@ template <typename T>
 class Grower {
  public:
   Grower(const Image<T>& image, const GrowOptions& options)
-      : image_(image), options_(options), rule_(image, options), seen_(image.grid.size) {}
+      : image_(image), options_(options), rule_(image, options) {}
 
   Result<void> start(const Vec3& seed_mm, std::size_t index) {
     const auto start = rule_.start(seed_mm, index);
@@ -64,7 +66,6 @@ class Grower {
  private:
   void label(const Voxel& v) {
     rule_.label_vessel(v);
-    seen_.set(v[0], v[1], v[2]);
     ++labelled_;
   }
   void watch_front(const Candidate& c);
@@ -76,7 +77,6 @@ class Grower {
   const Image<T>& image_;
   const GrowOptions& options_;
   AdaptiveThreshold<T> rule_;
-  BitVolume seen_;  // queued, examined or vessel
   std::priority_queue<Candidate, std::vector<Candidate>, LaterInQueue> queue_;
   std::uint64_t order_ = 0;
   GrowReport report_;
@@ -89,10 +89,10 @@ class Grower {
 template <typename T>
 void Grower<T>::queue_neighbours(const Voxel& v, double fading) {
   for_each(box_around(v, 1, image_.grid.size), [&](const Voxel& n) {
-    if (seen_.test(n[0], n[1], n[2])) return;
+    if (rule_.is_seen(n)) return;
     const double g = rule_.grey(n);
     if (!rule_.admissible(g, fading)) return;
-    seen_.set(n[0], n[1], n[2]);
+    rule_.mark_seen(n);
     queue_.push({g, order_++, n});
   });
 }

@@ -34,6 +34,10 @@ struct GrowOptions {
   // that fades along a thick vessel is followed: where vessel fills much of the neighbourhood and
   // is darker than this, `background` and `background_level` go down with it, to a quarter.
   std::optional<double> vessel_level;
+  // Standard deviation of a Gaussian by which the image is smoothed before anything else, as
+  // `smoothed` does it, but only near what is looked at; 0: not at all. All grey values meant above
+  // and reported are the smoothed ones. Not for growing in several modalities.
+  double smoothing_mm = 0;
   // Stops after looking at this many voxels.
   std::optional<std::size_t> max_examined;
   // A seed may lie this many voxels beside the vessel: it moves to the brightest voxel that near.
@@ -86,8 +90,9 @@ struct Segmentation {
 // An image with size[2] == 1 is grown in 2-D with 8 neighbours. NaN and infinite voxels are
 // background. Errors: no seed; a seed outside the image (named in mm and voxels); no vessel at the
 // seed (darker than `background`, not finite, or on the dark side of its neighbourhood);
-// kCancelled. Result is the same on every machine. Time: about N*N operations a voxel examined plus
-// the queue; memory beyond image and mask: 3/8 byte a voxel and the queue.
+// kCancelled. Result is the same on every machine. Time: about N*N additions a voxel examined (S1
+// is kept as sums over runs of N voxels) plus the queue; memory beyond image and mask: the queue,
+// and about 20 bytes a voxel near the vessels.
 Result<Segmentation> grow_region(const AnyImage& image, const std::vector<Vec3>& seeds_mm,
                                  const GrowOptions& options = {}, const Progress& progress = {});
 

@@ -3,149 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
-#include <numeric>
 
 #include <fmt/format.h>
 
-#include "recovery/gaussian.h"
 #include "recovery/morphology.h"
+#include "recovery/seed_levels.h"
 #include "recovery/topology_numbers.h"
 #include "recovery/tunnels.h"
 #include "recovery/vesselness.h"
 
 namespace angiospline {
+
+using namespace segmentation;
+
 namespace {
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-// A cube around a voxel, vessels bright, not-finite voxels left out of the values.
-struct Cube {
-  Image<double> grey;  // NaN where not finite
-  Voxel seed;          // within it
-  std::vector<double> values;
-};
-
-Cube cube_around(const AnyImage& image, const Voxel& centre, double half_mm, double sign) {
-  const ImageGrid& grid = grid_of(image);
-  Voxel low, size;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const int half =
-        static_cast<int>(std::lround(half_mm / grid.spacing_mm[static_cast<Eigen::Index>(i)]));
-    low[i] = std::max(0, centre[i] - half);
-    size[i] = std::min(grid.size[i] - 1, centre[i] + half) - low[i] + 1;
-  }
-  Cube cube;
-  cube.grey.grid.size = size;
-  cube.seed = {centre[0] - low[0], centre[1] - low[1], centre[2] - low[2]};
-  for (int z = 0; z < size[2]; ++z)
-    for (int y = 0; y < size[1]; ++y)
-      for (int x = 0; x < size[0]; ++x) {
-        const double v = sign * value_at(image, {low[0] + x, low[1] + y, low[2] + z});
-        cube.grey.voxels.push_back(v);
-        if (std::isfinite(v)) cube.values.push_back(v);
-      }
-  return cube;
-}
-
-// Voxels of the seed's component whose six neighbours in the cube belong to it too.
-std::vector<double> inside_of(const Cube& cube, const Components& parts, std::int32_t label) {
-  std::vector<double> inside;
-  for (std::size_t i = 0; i < cube.grey.voxels.size(); ++i) {
-    if (parts.labels.voxels[i] != label) continue;
-    const Voxel v = cube.grey.grid.voxel(i);
-    bool deep = true;
-    for (std::size_t k = 0; k < 3; ++k)
-      for (const int step : {-1, 1}) {
-        Voxel n = v;
-        n[k] += step;
-        deep = deep && (!cube.grey.grid.contains(n) || parts.labels[n] == label);
-      }
-    if (deep) inside.push_back(cube.grey.voxels[i]);
-  }
-  return inside;
-}
-
-SeedLevels levels_in(const Cube& cube, double threshold, double half_mm, const ImageGrid& grid) {
-  Mask bright(cube.grey.grid);
-  std::vector<double> background;
-  for (std::size_t i = 0; i < bright.voxels.size(); ++i) {
-    bright.voxels[i] = cube.grey.voxels[i] >= threshold;
-    if (cube.grey.voxels[i] < threshold) background.push_back(cube.grey.voxels[i]);
-  }
-  const Components parts = connected_components(bright, Neighbours::kCorners26);
-  const std::int32_t label = parts.labels[cube.seed];
-  std::vector<double> vessel = inside_of(cube, parts, label);
-  if (vessel.size() < 8) {  // too thin to have an inside
-    vessel.clear();
-    for (std::size_t i = 0; i < bright.voxels.size(); ++i)
-      if (parts.labels.voxels[i] == label) vessel.push_back(cube.grey.voxels[i]);
-  }
-  SeedLevels out;
-  const double n = static_cast<double>(vessel.size());
-  out.vessel = std::accumulate(vessel.begin(), vessel.end(), 0.0) / n;
-  double squares = 0;
-  for (const double v : vessel) squares += (v - out.vessel) * (v - out.vessel);
-  out.vessel_deviation = std::sqrt(squares / n);
-  out.background = median(background);
-  for (double& v : background) v = std::abs(v - out.background);
-  out.background_deviation = 1.4826 * median(background);
-  const double volume =
-      static_cast<double>(parts.list[static_cast<std::size_t>(label - 1)].voxels) *
-      grid.spacing_mm.prod();
-  out.radius_mm = std::sqrt(volume / (2 * half_mm * std::numbers::pi));
-  return out;
-}
-
-// Grey values (vessels bright) around one voxel; none if no cube up to 40 voxels shows a
-// background.
-std::optional<SeedLevels> levels_at(const AnyImage& image, const Voxel& seed, double sign) {
-  const ImageGrid& grid = grid_of(image);
-  const double voxel = grid.spacing_mm.minCoeff();
-  for (double half = 5; half <= 40; half *= 1.4) {
-    const Cube cube = cube_around(image, seed, half * voxel, sign);
-    if (cube.values.size() < 27) continue;
-    const double threshold = otsu_threshold(cube.values);
-    const auto below = std::count_if(cube.values.begin(), cube.values.end(),
-                                     [&](double v) { return v < threshold; });
-    if (static_cast<double>(below) < 0.6 * static_cast<double>(cube.values.size())) continue;
-    if (!(cube.grey[cube.seed] >= threshold)) continue;
-    return levels_in(cube, threshold, half * voxel, grid);
-  }
-  return std::nullopt;
-}
-
-SeedLevels median_of(const std::vector<SeedLevels>& all) {
-  SeedLevels out;
-  for (double SeedLevels::*field :
-       {&SeedLevels::vessel, &SeedLevels::vessel_deviation, &SeedLevels::background,
-        &SeedLevels::background_deviation, &SeedLevels::radius_mm}) {
-    std::vector<double> values;
-    for (const SeedLevels& l : all) values.push_back(l.*field);
-    out.*field = median(std::move(values));
-  }
-  return out;
-}
-
-Voxel brightest_near(const AnyImage& image, const Vec3& seed_mm, int reach, double sign) {
-  const ImageGrid& grid = grid_of(image);
-  const Vec3 at = grid.index_vox(seed_mm);
-  Voxel best{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
-             static_cast<int>(std::lround(at[2]))};
-  const Voxel middle = best;
-  for (int z = -reach; z <= reach; ++z)
-    for (int y = -reach; y <= reach; ++y)
-      for (int x = -reach; x <= reach; ++x) {
-        const Voxel v{middle[0] + x, middle[1] + y, middle[2] + z};
-        if (grid.contains(v) && sign * value_at(image, v) > sign * value_at(image, best)) best = v;
-      }
-  return best;
-}
 
 // Whether the grey values around a seed are those of a vessel in its background. Noise cut in two
 // at its middle has classes 1.9 apart, in root sums of their squared deviations, and by chance up
@@ -166,18 +37,24 @@ Error no_vessel_at(const Vec3& seed_mm) {
           "threshold, all three given, grow from any seed"};
 }
 
+double smoothing_mm(const AnyImage& image, const SegmentOptions& options) {
+  return options.smoothing_vox * grid_of(image).spacing_mm.minCoeff();
+}
+
 // Fills in what the caller left open, and says so. Errors: a given seed without a vessel.
 Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
                            SegmentReport& report) {
   GrowOptions grow;
   grow.polarity = options.polarity;
+  grow.smoothing_mm = smoothing_mm(image, options);
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
   std::vector<SeedLevels> all;
   for (const Vec3& seed : report.seeds_mm) {
-    const Voxel at = brightest_near(image, seed, 0, sign);
+    const Voxel at = voxel_at(grid_of(image), seed);
     if (!grid_of(image).contains(at)) continue;  // grow_region says so
-    const auto levels =
-        levels_at(image, brightest_near(image, seed, grow.seed_search_vox, sign), sign);
+    const auto levels = levels_at(
+        image, brightest_near(image, at, grow.seed_search_vox, sign, grow.smoothing_mm).at, sign,
+        grow.smoothing_mm);
     const bool all_given = options.neighbourhood_vox && options.deviations && options.background;
     if (!report.seeds_found && !all_given && !shows_vessel(levels)) return fail(no_vessel_at(seed));
     if (levels) all.push_back(*levels);
@@ -256,9 +133,8 @@ Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, Se
   if (closed->tunnels > 0)
     report.choices.push_back(
         fmt::format("{} tunnels too narrow to be loops of vessels are filled", closed->tunnels));
-  report.components = component_count(closed->mask, Neighbours::kCorners26);
-  const std::int64_t loops = topology_numbers(closed->mask).cycles;
-  return Attempt{std::move(closed->mask), std::move(report), loops};
+  report.components = static_cast<std::size_t>(closed->topology.components);
+  return Attempt{std::move(closed->mask), std::move(report), closed->topology.cycles};
 }
 
 // As attempt, but a leak is not followed to its end: vessels are a small part of an image.
@@ -302,12 +178,13 @@ double raised_background(const SegmentReport& report, double sign) {
 
 // The seeds that lie in what the threshold leaves of the vessels.
 std::vector<Vec3> seeds_beyond(const AnyImage& image, const std::vector<Vec3>& seeds,
-                               double background, double sign) {
+                               double background, double sign, double smoothing) {
   constexpr int kSearch = 2;
   std::vector<Vec3> left;
   for (const Vec3& seed : seeds) {
-    const Voxel v = brightest_near(image, seed, kSearch, sign);
-    if (grid_of(image).contains(v) && sign * value_at(image, v) > sign * background)
+    const Voxel v = voxel_at(grid_of(image), seed);
+    if (grid_of(image).contains(v) &&
+        brightest_near(image, v, kSearch, sign, smoothing).grey > sign * background)
       left.push_back(seed);
   }
   return left;
@@ -325,7 +202,8 @@ Result<Attempt> without_leak(const AnyImage& image, SegmentOptions options, Atte
     SegmentReport report;
     report.seeds_found = leaking.report.seeds_found;
     options.background = raised_background(leaking.report, sign);
-    report.seeds_mm = seeds_beyond(image, leaking.report.seeds_mm, *options.background, sign);
+    report.seeds_mm = seeds_beyond(image, leaking.report.seeds_mm, *options.background, sign,
+                                   smoothing_mm(image, options));
     if (report.seeds_mm.empty() ||
         (!report.seeds_found && report.seeds_mm.size() < leaking.report.seeds_mm.size()))
       return leaking;
@@ -342,9 +220,73 @@ Result<Attempt> without_leak(const AnyImage& image, SegmentOptions options, Atte
   return leaking;
 }
 
+std::string swelling_text(const Swelling& s) {
+  const std::string where =
+      fmt::format("voxel {},{},{} (grey {:.4g})", s.neck[0], s.neck[1], s.neck[2], s.grey);
+  const std::string what =
+      fmt::format("{} voxels behind {} are up to {:.3g} mm deep and the vessel before it {:.3g} mm",
+                  s.voxels, where, s.beyond_depth_mm, s.vessel_depth_mm);
+  return s.cut
+             ? what + ": they are left out"
+             : what + ": tissue behind a leak, or a wider vessel; --cut-swellings leaves them out";
+}
+
+// The neck behind which the front found most, and at least as much as it had; null if there is
+// none. Where it is about as bright as the vessel it is no neck but noise.
+const FrontLeap* widest_neck(const SegmentReport& report, double sign) {
+  constexpr std::size_t kLeastBefore = 100;  // voxels: a piece of the vessel
+  constexpr double kDarker = 0.1, kDeviations = 3;
+  if (!report.levels) return nullptr;
+  const SeedLevels& l = *report.levels;
+  const double darker =
+      std::max(kDarker * std::abs(l.vessel - l.background), kDeviations * l.vessel_deviation);
+  const FrontLeap* widest = nullptr;
+  for (const FrontLeap& leap : report.grown.leaps)
+    if (leap.before >= kLeastBefore && leap.opened >= leap.before &&
+        sign * leap.grey > sign * report.background &&
+        sign * leap.grey < sign * l.vessel - darker &&
+        (widest == nullptr || leap.opened > widest->opened))
+      widest = &leap;
+  return widest;
+}
+
+// Grows once more with a threshold just above the neck behind which the front found most, and
+// compares. Says so if a swelling lies there, and leaves it out if that was asked for.
+Result<Attempt> without_swelling(const AnyImage& image, SegmentOptions options, Attempt whole,
+                                 const Progress& progress) {
+  constexpr double kAboveNeck = 0.01;
+  const double sign = options.polarity == Polarity::kBright ? 1 : -1;
+  const FrontLeap* largest = widest_neck(whole.report, sign);
+  if (largest == nullptr) return whole;
+  const SeedLevels& levels = *whole.report.levels;
+  options.background = largest->grey + kAboveNeck * (levels.vessel - levels.background);
+  SegmentReport report;
+  report.seeds_found = whole.report.seeds_found;
+  report.seeds_mm = seeds_beyond(image, whole.report.seeds_mm, *options.background, sign,
+                                 smoothing_mm(image, options));
+  if (report.seeds_mm.empty()) return whole;
+  Result<Attempt> before = attempt(image, options, report, kNoLimit, progress);
+  if (!before && before.error().kind == ErrorKind::kCancelled) return fail(before.error());
+  if (!before) return whole;  // nothing grows from the seeds so bright
+  std::optional<SwellingParts> parts = find_swelling(whole.mask, std::move(before->mask));
+  if (!parts) return whole;
+  parts->swelling.grey = largest->grey;
+  parts->swelling.cut = options.cut_swellings;
+  if (options.cut_swellings) {
+    const TopologyNumbers topology = topology_numbers(parts->vessel);
+    whole.mask = std::move(parts->vessel);
+    whole.loops = topology.cycles;
+    whole.report.components = static_cast<std::size_t>(topology.components);
+  }
+  whole.report.warnings.push_back(swelling_text(parts->swelling));
+  whole.report.swelling = parts->swelling;
+  return whole;
+}
+
 }  // namespace
 
-Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const Progress& progress) {
+Result<Segmented> segment(const AnyImage& image, const SegmentOptions& options,
+                          const Progress& progress) {
   SegmentReport report;
   report.seeds_mm = options.seeds_mm;
   if (options.seeds_mm.empty()) {
@@ -364,14 +306,17 @@ Result<Segmented> segment(AnyImage image, const SegmentOptions& options, const P
                                          report.seeds_mm.size()));
   }
   if (progress.should_stop()) return fail(cancelled("segment"));
-  image = smoothed(std::move(image), options.smoothing_vox * grid_of(image).spacing_mm.minCoeff());
   Result<Attempt> done = options.background
                              ? attempt(image, options, std::move(report), kNoLimit, progress)
                              : cautious_attempt(image, options, report, progress);
   if (done && done->leaks() && !options.background && done->report.levels)
     done = without_leak(image, options, std::move(*done), progress);
   if (!done) return fail(done.error());
-  if (done->leaks()) done->report.warnings.push_back(leak_warning(*done));
+  if (done->leaks())
+    done->report.warnings.push_back(leak_warning(*done));
+  else
+    done = without_swelling(image, options, std::move(*done), progress);
+  if (!done) return fail(done.error());
   return Segmented{std::move(done->mask), std::move(done->report)};
 }
 

@@ -10,6 +10,7 @@
 #include "base/result.h"
 #include "recovery/any_image.h"
 #include "recovery/region_growing.h"
+#include "recovery/swelling.h"
 
 namespace angiospline {
 
@@ -26,6 +27,9 @@ struct SegmentOptions {
   double smoothing_vox = 0.8;
   // Holes within a slice of at most this many voxels are filled; cavities always are.
   std::size_t largest_hole_vox = 6;
+  // Leaves out what the front reached through a neck and is so much thicker than the vessel that it
+  // is probably tissue (see Swelling); otherwise it is only reported.
+  bool cut_swellings = false;
 };
 
 // Grey values around a seed.
@@ -45,6 +49,7 @@ struct SegmentReport {
   double background = 0;
   std::size_t filled_voxels = 0;
   std::size_t components = 0;         // 26-connected
+  std::optional<Swelling> swelling;   // behind the neck where the front found most
   std::vector<std::string> choices;   // what was chosen, and from what: one sentence each
   std::vector<std::string> warnings;  // leaks, limits
 };
@@ -54,7 +59,7 @@ struct Segmented {
   SegmentReport report;
 };
 
-// The vessels at the seeds. Pass the image by std::move to smooth it in place. The grey values of
+// The vessels at the seeds. The image is smoothed only where it is looked at; the grey values of
 // the report are those after smoothing.
 //
 // Choices. Around each seed the smallest cube with more background than vessel in it is split in
@@ -66,10 +71,12 @@ struct Segmented {
 //              In case the mask leaks (more than 20 loops), the threshold rises step by step until
 //              it does not, first to the neck behind which the front grew suddenly; found seeds
 //              that are darker are dropped.
+//   swelling   Where the front found most behind a neck darker than the vessel, and more than 2.5
+//              times as thick, a warning says so; `cut_swellings` leaves it out.
 //   level      b is the `background_level` of GrowOptions
 // Errors: those of grow_region; a given seed around which no vessel stands out (unless N, M and the
 // background are all given); no seed given and nothing tubular found.
-Result<Segmented> segment(AnyImage image, const SegmentOptions& options = {},
+Result<Segmented> segment(const AnyImage& image, const SegmentOptions& options = {},
                           const Progress& progress = {});
 
 }  // namespace angiospline

@@ -36,40 +36,41 @@ std::array<std::int8_t, 256> window_parts(Connectivity connectivity) {
   return parts;
 }
 
-bool is_empty(const std::uint8_t* row, int n) {
-  const auto count = static_cast<std::size_t>(n);
-  return next_foreground(row, 0, count) == count;
-}
-
-std::int64_t euler_characteristic(const Mask& mask, Connectivity connectivity) {
+std::int64_t euler_characteristic(const Mask& mask, const std::vector<RowExtent>& extents,
+                                  Connectivity connectivity) {
   const Voxel n = mask.grid.size;
   const std::array<std::int8_t, 256> parts = window_parts(connectivity);
   const std::vector<std::uint8_t> outside(static_cast<std::size_t>(n[0]), 0);
-  const auto row = [&](int y, int z) {
-    return y < 0 || z < 0 || y >= n[1] || z >= n[2] ? outside.data()
-                                                    : &mask.voxels[mask.grid.offset({0, y, z})];
-  };
-  const auto sum_layer = [&](int z) {
+  const auto sum_windows = [&](int y, int z) {
+    std::array<const std::uint8_t*, 4> r;
+    int begin = n[0], end = 0;
+    for (unsigned k = 0; k < 4; ++k) {
+      const int row_y = y - 1 + static_cast<int>(k & 1), row_z = z - 1 + static_cast<int>(k >> 1);
+      r[k] = outside.data();
+      if (row_y < 0 || row_z < 0 || row_y >= n[1] || row_z >= n[2]) continue;
+      const RowExtent& e =
+          extents[static_cast<std::size_t>(row_y) +
+                  static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(row_z)];
+      if (e.empty()) continue;
+      r[k] = &mask.voxels[mask.grid.offset({0, row_y, row_z})];
+      begin = std::min(begin, e.begin);
+      end = std::max(end, e.end);
+    }
     std::int64_t sum = 0;
-    for (int y = 0; y <= n[1]; ++y) {
-      const std::array<const std::uint8_t*, 4> r{row(y - 1, z - 1), row(y, z - 1), row(y - 1, z),
-                                                 row(y, z)};
-      if (std::all_of(r.begin(), r.end(), [&](const std::uint8_t* p) { return is_empty(p, n[0]); }))
-        continue;
-      unsigned w = 0;
-      for (int x = 0; x <= n[0]; ++x) {
-        w = w >> 1 & 0x55U;
-        if (x < n[0])
-          for (unsigned k = 0; k < 4; ++k) w |= (r[k][x] != 0 ? 2U : 0U) << (2 * k);
-        sum += parts[w];
-      }
+    unsigned w = 0;
+    for (int x = begin; x <= end && end > 0; ++x) {
+      w = w >> 1 & 0x55U;
+      if (x < n[0])
+        for (unsigned k = 0; k < 4; ++k) w |= (r[k][x] != 0 ? 2U : 0U) << (2 * k);
+      sum += parts[w];
     }
     return sum;
   };
   return tbb::parallel_reduce(
       tbb::blocked_range<int>(0, n[2] + 1), std::int64_t{0},
       [&](const tbb::blocked_range<int>& range, std::int64_t sum) {
-        for (int z = range.begin(); z < range.end(); ++z) sum += sum_layer(z);
+        for (int z = range.begin(); z < range.end(); ++z)
+          for (int y = 0; y <= n[1]; ++y) sum += sum_windows(y, z);
         return sum;
       },
       std::plus<>());
@@ -78,8 +79,12 @@ std::int64_t euler_characteristic(const Mask& mask, Connectivity connectivity) {
 // Counts the pieces of foreground or background by joining runs along x with those of earlier rows.
 class RunPieces {
  public:
-  RunPieces(const Mask& mask, bool foreground, Connectivity connectivity)
-      : mask_(mask), foreground_(foreground), reach_(connectivity == Connectivity::k26 ? 1 : 0) {
+  RunPieces(const Mask& mask, const std::vector<RowExtent>& extents, bool foreground,
+            Connectivity connectivity)
+      : mask_(mask),
+        extents_(extents),
+        foreground_(foreground),
+        reach_(connectivity == Connectivity::k26 ? 1 : 0) {
     const Voxel n = mask.grid.size;
     parent_.push_back(0);  // piece 0 is the outside
     row_begin_.assign(static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]) + 1, 0);
@@ -112,33 +117,35 @@ class RunPieces {
            static_cast<std::size_t>(mask_.grid.size[1]) * static_cast<std::size_t>(z);
   }
 
+  // Background before and behind a row's foreground reaches the border: it is part of the outside.
   void add_row(int y, int z) {
     const Voxel n = mask_.grid.size;
-    const std::uint8_t* row = &mask_.voxels[mask_.grid.offset({0, y, z})];
-    const bool rim = y == 0 || z == 0 || y == n[1] - 1 || z == n[2] - 1;
-    for (int x = 0; x < n[0];) {
-      if (foreground_)
-        x = static_cast<int>(
-            next_foreground(row, static_cast<std::size_t>(x), static_cast<std::size_t>(n[0])));
-      const int begin = x;
-      x = end_of_run(row, x);
-      if (x > begin) {
-        runs_.push_back({begin, x, parent_.size()});
-        parent_.push_back(parent_.size());
-        if (!foreground_ && (rim || begin == 0 || x == n[0])) unite(0, runs_.back().piece);
+    const RowExtent& extent = extents_[row_index(y, z)];
+    if (extent.empty()) {
+      if (!foreground_) runs_.push_back({0, n[0], 0});
+    } else {
+      const bool rim = y == 0 || z == 0 || y == n[1] - 1 || z == n[2] - 1;
+      const std::uint8_t* row = &mask_.voxels[mask_.grid.offset({0, y, z})];
+      if (!foreground_ && extent.begin > 0) runs_.push_back({0, extent.begin, 0});
+      for (int x = extent.begin; x < extent.end;) {
+        const int begin = x;
+        while (x < extent.end && row[x] != 0) ++x;
+        const int gap = x;
+        x = static_cast<int>(next_foreground(row, static_cast<std::size_t>(x),
+                                             static_cast<std::size_t>(extent.end)));
+        if (foreground_)
+          add_piece(begin, gap, false);
+        else if (x < extent.end)
+          add_piece(gap, x, rim);
       }
-      while (x < n[0] && (row[x] != 0) != foreground_) ++x;
+      if (!foreground_ && extent.end < n[0]) runs_.push_back({extent.end, n[0], 0});
     }
     row_begin_[row_index(y, z) + 1] = runs_.size();
   }
 
-  int end_of_run(const std::uint8_t* row, int x) const {
-    const int n = mask_.grid.size[0];
-    if (!foreground_)
-      return static_cast<int>(
-          next_foreground(row, static_cast<std::size_t>(x), static_cast<std::size_t>(n)));
-    while (x < n && row[x] != 0) ++x;
-    return x;
+  void add_piece(int begin, int end, bool is_outside) {
+    runs_.push_back({begin, end, is_outside ? 0 : parent_.size()});
+    if (!is_outside) parent_.push_back(parent_.size());
   }
 
   void join(int y, int z, int other_y, int other_z) {
@@ -169,6 +176,7 @@ class RunPieces {
   }
 
   const Mask& mask_;
+  const std::vector<RowExtent>& extents_;
   bool foreground_;
   int reach_;
   std::vector<Run> runs_;
@@ -183,9 +191,10 @@ TopologyNumbers topology_numbers(const Mask& mask, Connectivity connectivity) {
   if (mask.voxels.empty()) return t;
   const Connectivity other =
       connectivity == Connectivity::k26 ? Connectivity::k6 : Connectivity::k26;
-  t.components = RunPieces(mask, true, connectivity).count();
-  t.cavities = RunPieces(mask, false, other).count();
-  t.euler = euler_characteristic(mask, connectivity);
+  const std::vector<RowExtent> extents = row_extents(mask);
+  t.components = RunPieces(mask, extents, true, connectivity).count();
+  t.cavities = RunPieces(mask, extents, false, other).count();
+  t.euler = euler_characteristic(mask, extents, connectivity);
   t.cycles = t.components + t.cavities - t.euler;
   return t;
 }

@@ -144,7 +144,8 @@ bool deep_enough(const Mask& mask, const std::vector<std::size_t>& group, double
 Result<ClosedTunnels> close_tunnels(Mask mask, const TunnelOptions& options,
                                     const Progress& progress) {
   ClosedTunnels out;
-  const std::int64_t loops = topology_numbers(mask).cycles;
+  out.topology = topology_numbers(mask);
+  const std::int64_t loops = out.topology.cycles;
   out.mask = std::move(mask);
   if (loops == 0 || loops > kMostTunnels) return out;
   for (std::uint8_t& v : out.mask.voxels) v = v != 0 ? kForeground : kBackground;
@@ -166,8 +167,8 @@ Result<ClosedTunnels> close_tunnels(Mask mask, const TunnelOptions& options,
   Filled cavities = fill_cavities(std::move(out.mask));
   out.mask = std::move(cavities.mask);
   out.voxels += cavities.voxels;
-  out.tunnels = static_cast<std::size_t>(
-      std::max<std::int64_t>(0, loops - topology_numbers(out.mask).cycles));
+  out.topology = topology_numbers(out.mask);
+  out.tunnels = static_cast<std::size_t>(std::max<std::int64_t>(0, loops - out.topology.cycles));
   return out;
 }
 

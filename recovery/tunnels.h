@@ -6,6 +6,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "recovery/image.h"
+#include "recovery/topology_numbers.h"
 
 namespace angiospline {
 
@@ -20,8 +21,9 @@ struct TunnelOptions {
 
 struct ClosedTunnels {
   Mask mask;
-  std::size_t tunnels = 0;  // loops fewer
-  std::size_t voxels = 0;   // that became foreground
+  std::size_t tunnels = 0;   // loops fewer
+  std::size_t voxels = 0;    // that became foreground
+  TopologyNumbers topology;  // of the mask, foreground 26-connected
 };
 
 // The mask with its narrow tunnels filled. Closing by balls of growing radius (in mm, spacing

@@ -1,11 +1,11 @@
 #include <cmath>
-#include <numbers>
+#include <optional>
 
 #include <gtest/gtest.h>
 
 #include "recovery/metrics.h"
 #include "recovery/multimodal.h"
-#include "recovery/phantom.h"
+#include "recovery/rings_experiment.h"
 
 namespace angiospline {
 namespace {
@@ -46,115 +46,62 @@ TEST(XrayGeometry, AViewOfABallHasItsChordInTheMiddle) {
   EXPECT_EQ(noisy.voxels, project_volume(ball, c_arm_geometry(arm), 0.05, 20, 4).voxels);
 }
 
-// The experiment of thesis 7.1: rings with losses of signal every 45 degrees, 22.5 degrees apart in
-// the volume and in four projections at 0, 30, 80 and 145 degrees; SNR 20.
+// The experiment of thesis 7.1.
 class RingsInTwoModalities : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    PhantomOptions o;
-    o.edges = PhantomEdges::kSteps;
-    o.snr = 20;
-    o.loss_deg = 12;
-    o.loss_depth = 0.65;
-    const Phantom volume = *make_phantom(PhantomKind::kRings, o);
-    o.snr.reset();
-    o.loss_phase_deg = 22.5;
-    o.background = 0;
-    o.vessel = 1000;
-    const Phantom density = *make_phantom(PhantomKind::kRings, o);
-    images_.volume = Image<float>(volume.image.grid);
-    Image<float> filled(density.image.grid);
-    for (std::size_t i = 0; i < filled.voxels.size(); ++i) {
-      images_.volume->voxels[i] = volume.image.voxels[i];
-      filled.voxels[i] = static_cast<float>(density.image.voxels[i]) / 1000;
-    }
-    std::uint64_t seed = 1;
-    for (const double angle : {0.0, 30.0, 80.0, 145.0}) {
-      CArm arm;
-      arm.angle_deg = angle;
-      arm.centre_mm = Vec3::Constant(63.5);
-      arm.pixel_mm = 0.8;
-      const XrayGeometry g = c_arm_geometry(arm);
-      images_.views.push_back({g, project_volume(filled, g, 0.1, 20.0, seed++)});
-    }
-    PhantomOptions world;
-    world.edges = PhantomEdges::kSteps;
-    world.spacing_mm = Vec3::Constant(0.5);
-    world.origin_mm = Vec3::Constant(-0.25);
-    truth_ = make_phantom(PhantomKind::kRings, world)->truth;
-  }
-  static void TearDownTestSuite() {
-    images_ = {};
-    truth_ = {};
+  static void SetUpTestSuite() { rings_ = *make_rings_experiment(); }
+  static void TearDownTestSuite() { rings_.reset(); }
+
+  static MultimodalSegmentation grown(RingsImages images, std::size_t seeds = 3) {
+    std::vector<Vec3> at = rings_seeds_mm();
+    at.resize(seeds);
+    auto s = grow_rings(*rings_, images, at);
+    EXPECT_TRUE(s.has_value()) << s.error().message();
+    return s ? std::move(*s) : MultimodalSegmentation{};
   }
 
-  static Result<MultimodalSegmentation> grown(const Modalities& images, std::size_t rings = 3) {
-    std::vector<Vec3> seeds;
-    for (const Ring& ring : phantom_rings())
-      if (seeds.size() < rings) seeds.push_back(ring.at(11.25 * std::numbers::pi / 180));
-    MultimodalOptions o;
-    o.volume.background = 400;
-    o.max_examined = 400000;
-    return grow_region(images, truth_.grid, seeds, o);
-  }
-
-  static Modalities images_;
-  static Mask truth_;
+  static std::optional<RingsExperiment> rings_;
 };
-Modalities RingsInTwoModalities::images_;
-Mask RingsInTwoModalities::truth_;
+std::optional<RingsExperiment> RingsInTwoModalities::rings_;
 
 TEST_F(RingsInTwoModalities, TheVolumeAloneFailsToSpanTheGaps) {
-  Modalities only = images_;
-  only.views.clear();
-  const auto s = grown(only);
-  ASSERT_TRUE(s.has_value()) << s.error().message();
-  const auto c = compare_masks(truth_, s->mask);
-  EXPECT_LT(c->result_voxels, truth_.voxels.size() / 100);
-  EXPECT_LT(static_cast<double>(c->both), 0.2 * static_cast<double>(c->truth_voxels));
+  const RingsMeasure m = measure_rings(*rings_, grown(RingsImages::kVolume).mask);
+  EXPECT_GT(m.found, 0.01);
+  EXPECT_LT(m.found, 0.2);
+  for (const double arc : m.arc) EXPECT_LT(arc, 0.25);
+  EXPECT_LT(m.artefact, 0.1);  // half-filled voxels of the wall
 }
 
 TEST_F(RingsInTwoModalities, TheProjectionsAloneFillThePlane) {
-  Modalities only = images_;
-  only.volume.reset();
-  const auto s = grown(only, 1);
-  ASSERT_TRUE(s.has_value()) << s.error().message();
-  const auto c = compare_masks(truth_, s->mask);
-  EXPECT_GT(c->beyond, c->both);  // most of it is artefact
+  const RingsMeasure m = measure_rings(*rings_, grown(RingsImages::kViews, 1).mask);
+  EXPECT_GT(m.artefact, 0.5);
+  EXPECT_GT(m.farthest_mm, 10);
 }
 
 TEST_F(RingsInTwoModalities, TogetherTheyCompleteAllThreeRings) {
-  const auto s = grown(images_);
-  ASSERT_TRUE(s.has_value()) << s.error().message();
-  const auto c = compare_masks(truth_, s->mask);
+  const MultimodalSegmentation s = grown(RingsImages::kBoth);
+  const auto c = compare_masks(rings_->truth, s.mask);
   EXPECT_GT(c->dice, 0.9);
   EXPECT_EQ(c->result_topology.components, 3);
-  EXPECT_LT(c->surface->hausdorff_mm, 4);  // four voxels of the volume: no artefact
+  const RingsMeasure m = measure_rings(*rings_, s.mask);
+  EXPECT_LT(m.farthest_mm, 4);                          // four voxels of the volume: no artefact
+  for (const double arc : m.arc) EXPECT_GT(arc, 0.97);  // but for single voxels
   // Both were needed.
-  EXPECT_GT(s->report.by_views, 1000U);
-  EXPECT_GT(s->report.by_volume, 1000U);
-  EXPECT_FALSE(s->report.limit_reached);
-  // Every ring is whole: its centerline is vessel all the way round but for single voxels.
-  for (const Ring& ring : phantom_rings()) {
-    int inside = 0;
-    for (int k = 0; k < 360; ++k) {
-      const Vec3 at = truth_.grid.index_vox(ring.at(k * std::numbers::pi / 180));
-      inside += s->mask[{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
-                         static_cast<int>(std::lround(at[2]))}] != 0;
-    }
-    EXPECT_GT(inside, 350);
-  }
+  EXPECT_GT(s.report.by_views, 1000U);
+  EXPECT_GT(s.report.by_volume, 1000U);
+  EXPECT_FALSE(s.report.limit_reached);
   // The gaps of the volume were filled in.
   std::size_t changed = 0;
-  for (std::size_t i = 0; i < images_.volume->voxels.size(); ++i)
-    changed += images_.volume->voxels[i] != s->modalities.volume->voxels[i];
+  const auto& before = rings_->volume.image.voxels;
+  for (std::size_t i = 0; i < before.size(); ++i)
+    changed += static_cast<float>(before[i]) != s.modalities.volume->voxels[i];
   EXPECT_GT(changed, 1000U);
 }
 
 TEST_F(RingsInTwoModalities, BadRequestsAreNamed) {
-  EXPECT_FALSE(grow_region(Modalities{}, truth_.grid, {Vec3::Zero()}).has_value());
-  EXPECT_FALSE(grow_region(images_, truth_.grid, {}).has_value());
-  const auto outside = grow_region(images_, truth_.grid, {Vec3(900, 0, 0)});
+  EXPECT_FALSE(grow_region(Modalities{}, rings_->truth.grid, {Vec3::Zero()}).has_value());
+  EXPECT_FALSE(grow_rings(*rings_, RingsImages::kBoth, {}).has_value());
+  const auto outside = grow_rings(*rings_, RingsImages::kBoth, {Vec3(900, 0, 0)});
   ASSERT_FALSE(outside.has_value());
   EXPECT_EQ(outside.error().where, "seed 1");
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "recovery/gaussian.h"
 #include "recovery/morphology.h"
 #include "recovery/phantom.h"
 #include "recovery/region_growing.h"
@@ -164,6 +165,23 @@ TEST(RegionGrowing, AgreesWithTheDefinitionVoxelByVoxel) {
 
 // Thesis 7.1.1, table 7.1: more deviations take in more; a larger neighbourhood is more
 // conservative; the gaps of lost signal are not spanned.
+TEST(RegionGrowing, SmoothsAsItGoesWhatSmoothingTheWholeGives) {
+  PhantomOptions o;
+  o.snr = 5;
+  const Phantom p = phantom(PhantomKind::kBentVessel, o);
+  GrowOptions whole, lazy;
+  lazy.smoothing_mm = 0.8;
+  const auto a = grow_region(smoothed(p.image, 0.8), {on_first_branch(p)}, whole);
+  const auto b = grow_region(p.image, {on_first_branch(p)}, lazy);
+  ASSERT_TRUE(a && b);
+  EXPECT_GT(a->report.voxels, 300U);
+  EXPECT_EQ(a->mask.voxels, b->mask.voxels);
+  EXPECT_EQ(a->report.vessel_mean, b->report.vessel_mean);
+  EXPECT_EQ(a->report.threshold_mean, b->report.threshold_mean);
+  lazy.smoothing_mm = -1;
+  EXPECT_FALSE(grow_region(p.image, {on_first_branch(p)}, lazy).has_value());
+}
+
 TEST(RegionGrowing, FollowsTheTrendsOfTable71) {
   PhantomOptions o = steps();
   o.snr = 20;

@@ -73,6 +73,39 @@ TEST(Gaussian, RoundsIntegersAndLeavesFlatAxesAlone) {
   EXPECT_EQ(smoothed(slice, 0.0).voxels, slice.voxels);
 }
 
+TEST(Gaussian, OfABoxIsTheBoxOfTheWhole) {
+  Random random(8);
+  ImageGrid grid{{19, 12, 9}, Vec3(0.5, 0.8, 1.1), Vec3(3, 2, 1), Mat3::Identity()};
+  Image<std::int16_t> whole(grid);
+  Image<float> with_holes(grid);
+  for (std::size_t i = 0; i < whole.voxels.size(); ++i) {
+    whole.voxels[i] = static_cast<std::int16_t>(std::lround(3000 * random.gaussian()));
+    with_holes.voxels[i] = random.uniform() < 0.05 ? std::numeric_limits<float>::quiet_NaN()
+                                                   : static_cast<float>(random.gaussian());
+  }
+  for (const double sigma : {0.0, 0.4, 1.0}) {
+    const Image<std::int16_t> all = smoothed(whole, sigma);
+    const Image<float> all_with_holes = smoothed(with_holes, sigma);
+    for (const auto& [low, high] :
+         {std::pair{Voxel{0, 0, 0}, Voxel{18, 11, 8}}, std::pair{Voxel{5, 4, 3}, Voxel{7, 9, 3}},
+          std::pair{Voxel{18, 0, 8}, Voxel{18, 0, 8}}}) {
+      const auto box = smoothed_box(whole, low, high, sigma);
+      const auto box_with_holes = smoothed_box(with_holes, low, high, sigma);
+      EXPECT_TRUE(box.grid.origin_mm.isApprox(grid.world_mm(low)));
+      for (std::size_t i = 0; i < box.voxels.size(); ++i) {
+        const Voxel v = box.grid.voxel(i);
+        const Voxel at{low[0] + v[0], low[1] + v[1], low[2] + v[2]};
+        ASSERT_EQ(box.voxels[i], all[at]);
+        const float hole = all_with_holes[at];
+        if (std::isnan(hole))
+          ASSERT_TRUE(std::isnan(box_with_holes.voxels[i]));
+        else
+          ASSERT_NEAR(box_with_holes.voxels[i], hole, 1e-5F);
+      }
+    }
+  }
+}
+
 TEST(Vesselness, AnswersToTubesAndNotToSheetsOrBalls) {
   ImageGrid grid;
   grid.size = {41, 41, 41};
@@ -213,6 +246,61 @@ TEST(Segment, RaisesTheThresholdUntilALeakIsShut) {
     return text.find("growing leaked") != std::string::npos;
   }));
   EXPECT_GT(compare_masks(p->truth, s->mask)->dice, 0.95);
+}
+
+// A vessel that touches a ball of tissue nearly as bright, without any hole in it.
+TEST(Segment, SaysWhenItLeaksIntoTissueWithoutHolesAndCutsItOnRequest) {
+  Image<std::int16_t> image(ImageGrid{{72, 64, 96}, Vec3::Ones(), Vec3::Zero(), Mat3::Identity()});
+  Random random(5);
+  std::size_t vessel = 0;
+  for (std::size_t i = 0; i < image.voxels.size(); ++i) {
+    const Voxel v = image.grid.voxel(i);
+    const bool tube = std::hypot(v[0] - 16, v[1] - 32) <= 3.5;
+    const bool ball = std::hypot(v[0] - 44, v[1] - 32, v[2] - 48) <= 18;
+    const bool neck =
+        std::abs(v[1] - 32) <= 1 && std::abs(v[2] - 48) <= 1 && v[0] > 16 && v[0] < 30;
+    const double grey = tube ? 1000 : ball ? 950 : neck ? 800 : 200;
+    vessel += tube;
+    image.voxels[i] = static_cast<std::int16_t>(std::lround(grey + 40 * random.gaussian()));
+  }
+  SegmentOptions o;
+  o.seeds_mm = {Vec3(16, 32, 10)};
+  const auto leaked = segment(image, o);
+  ASSERT_TRUE(leaked.has_value()) << leaked.error().message();
+  ASSERT_TRUE(leaked->report.swelling.has_value());
+  const Swelling& s = *leaked->report.swelling;
+  EXPECT_FALSE(s.cut);
+  EXPECT_GT(s.voxels, 15000U);
+  EXPECT_NEAR(s.neck[0], 24, 5);  // from the tube's wall to the ball's
+  EXPECT_NEAR(s.neck[1], 32, 3);
+  EXPECT_NEAR(s.neck[2], 48, 3);
+  EXPECT_NEAR(s.beyond_depth_mm, 18, 2);
+  EXPECT_NEAR(s.vessel_depth_mm, 4, 1);
+  EXPECT_FALSE(leaked->report.warnings.empty());
+  o.cut_swellings = true;
+  const auto sound = segment(image, o);
+  ASSERT_TRUE(sound.has_value()) << sound.error().message();
+  ASSERT_TRUE(sound->report.swelling.has_value());
+  EXPECT_TRUE(sound->report.swelling->cut);
+  EXPECT_NEAR(static_cast<double>(voxel_count(sound->mask)), static_cast<double>(vessel),
+              0.1 * static_cast<double>(vessel));
+}
+
+TEST(Swelling, IsNoneInAVesselThatWidensOrAnEmptyMask) {
+  Mask mask(ImageGrid{{40, 40, 60}, Vec3::Ones(), Vec3::Zero(), Mat3::Identity()});
+  EXPECT_FALSE(find_swelling(mask, mask).has_value());
+  Mask before(mask.grid);
+  for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
+    const Voxel v = mask.grid.voxel(i);
+    const double radius = v[2] < 30 ? 5 : 10;
+    mask.voxels[i] = std::hypot(v[0] - 20, v[1] - 20) <= radius ? 1 : 0;
+    before.voxels[i] = v[2] < 30 ? mask.voxels[i] : 0;
+  }
+  EXPECT_FALSE(find_swelling(mask, before).has_value());
+  const auto parts = find_swelling(mask, before, 1.5);  // but by another measure it is one
+  ASSERT_TRUE(parts.has_value());
+  EXPECT_NEAR(parts->swelling.neck[2], 30, 5);
+  EXPECT_EQ(voxel_count(parts->vessel) + parts->swelling.voxels, voxel_count(mask));
 }
 
 TEST(Segment, DarkVesselsAreFoundToo) {
