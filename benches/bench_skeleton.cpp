@@ -9,6 +9,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <string>
 
 #include <fmt/format.h>
@@ -98,11 +99,37 @@ void thinning_row(const std::string& name, const Mask& mask, bool with_peer) {
   if (with_peer) fmt::print("{:<10} skimage   {}", name, peer(mask));
 }
 
+// What becomes of the mask of a known tree.
+void quality_row(const std::string& name, const Mask& mask, const CenterlineTree& truth) {
+  Vessels v;
+  const Measured m = measured([&] { v = vessels_from_mask(mask).value(); });
+  const test::TreeMatch match = test::match(truth, v.tree);
+  const test::CenterlineErrors e = test::centerline_errors(truth, v.tree);
+  const auto row = [](const test::Match& found) {
+    return fmt::format("{} of {} ({} found)", found.paired, found.truth, found.found);
+  };
+  fmt::print(
+      "{:<10} tree {:.2f} s: ends {}, junctions {}, branches {}; off centre mean {:.3f} worst "
+      "{:.2f} "
+      "voxel, radius bias {:+.1f} %, tips lost at most {:.1f} voxel\n",
+      name, m.seconds, row(match.ends), row(match.junctions), row(match.branches), e.mean_mm,
+      e.worst_mm, 100.0 * e.radius_bias, match.worst_tip_lost_mm);
+}
+
 void thinning() {
   const CenterlineTree tree = grown(512, 12, 3, 61, 4);
   Mask mask = test::empty_mask({512, 512, 512});
   test::paint(mask, tree);
   thinning_row(fmt::format("tree {}", tree.branches.size()), mask, true);
+  quality_row("tree", mask, tree);
+  Mask ring = test::empty_mask({96, 96, 24});
+  for (int k = 0; k < 720; ++k) {
+    const double a = k * std::numbers::pi / 360;
+    const Vec3 p(48 + 30 * std::cos(a), 48 + 30 * std::sin(a), 12);
+    test::add_tube(ring, p, p, 5);
+  }
+  const Vessels loop = vessels_from_mask(ring).value();
+  fmt::print("pure ring  {} branch, {} cycle\n", loop.tree.branches.size(), cycle_count(loop.tree));
   thinning_row("rings 256", test::rings_mask(256, 95, 8), true);
   Random random(3);
   Image<float> noise(test::empty_mask({256, 256, 256}).grid);
@@ -166,45 +193,52 @@ void trees() {
   }
 }
 
+// How far points lie off an axis, in voxels of the image (each coordinate in its own spacing).
+struct OffAxis {
+  double sum = 0.0;
+  double worst = 0.0;
+  double worst_at_tips = 0.0;  // within a radius of either end
+  int points = 0;
+};
+
 // Flat-ended tubes of length 54 in random directions; with slices of 3 mm the radii are at least 3.
+void tubes_row(double slice_mm, double radius) {
+  Random random(11);
+  OffAxis off;
+  double width = 0.0;
+  double length = 0.0;
+  constexpr int kTubes = 20;
+  for (int i = 0; i < kTubes; ++i) {
+    const Vec3 axis = Vec3(random.gaussian(), random.gaussian(), random.gaussian()).normalized();
+    const Vec3 center(45.0 + random.uniform(), 45.0 + random.uniform(), 45.0 + random.uniform());
+    Mask mask = test::empty_mask({92, 92, static_cast<int>(92 / slice_mm)}, Vec3(1, 1, slice_mm));
+    test::add_tube(mask, center - 27.0 * axis, center + 27.0 * axis, radius, test::Ends::kFlat);
+    const CenterlineTree tree = vessels_from_mask(mask).value().tree;
+    for (const CenterlineBranch& b : tree.branches) {
+      length += length_mm(b) / kTubes;
+      for (Eigen::Index k = 0; k < b.points_mm.cols(); ++k) {
+        const Vec3 d = b.points_mm.col(k) - center;
+        const Vec3 across = d - d.dot(axis) * axis;
+        const double vox = across.cwiseQuotient(mask.grid.spacing_mm).norm();
+        double& worst = std::abs(d.dot(axis)) > 27.0 - radius ? off.worst_at_tips : off.worst;
+        off.sum += vox;
+        worst = std::max(worst, vox);
+        width += b.radii_mm[k] / radius;
+        ++off.points;
+      }
+    }
+  }
+  fmt::print(
+      "tubes 1:1:{} radius {:>4} mm: off centre mean {:.3f} worst {:.2f}, at tips {:.2f} voxel, "
+      "radius bias {:+.1f} %, length {:.1f} of 54\n",
+      slice_mm, radius, off.sum / off.points, off.worst, off.worst_at_tips,
+      100.0 * (width / off.points - 1.0), length);
+}
+
 void tubes() {
   for (const double slice_mm : {1.0, 3.0})
-    for (const double radius : {1.5, 2.0, 3.0, 5.0, 8.0, 12.0}) {
-      if (radius < slice_mm) continue;
-      Random random(11);
-      double mean = 0.0;
-      double worst = 0.0;
-      double width = 0.0;
-      double length = 0.0;
-      int points = 0;
-      constexpr int kTubes = 20;
-      for (int i = 0; i < kTubes; ++i) {
-        const Vec3 axis =
-            Vec3(random.gaussian(), random.gaussian(), random.gaussian()).normalized();
-        const Vec3 center(45.0 + random.uniform(), 45.0 + random.uniform(),
-                          45.0 + random.uniform());
-        Mask mask =
-            test::empty_mask({92, 92, static_cast<int>(92 / slice_mm)}, Vec3(1, 1, slice_mm));
-        test::add_tube(mask, center - 27.0 * axis, center + 27.0 * axis, radius, test::Ends::kFlat);
-        const CenterlineTree tree = vessels_from_mask(mask).value().tree;
-        for (const CenterlineBranch& b : tree.branches) {
-          length += length_mm(b) / kTubes;
-          for (Eigen::Index k = 0; k < b.points_mm.cols(); ++k) {
-            const Vec3 d = b.points_mm.col(k) - center;
-            const double off = (d - d.dot(axis) * axis).norm();
-            mean += off;
-            worst = std::max(worst, off);
-            width += b.radii_mm[k] / radius;
-            ++points;
-          }
-        }
-      }
-      fmt::print(
-          "tubes 1:1:{} radius {:>4} mm: off centre mean {:.3f} worst {:.2f} mm, radius bias "
-          "{:+.1f} %, "
-          "length {:.1f} of 54\n",
-          slice_mm, radius, mean / points, worst, 100.0 * (width / points - 1.0), length);
-    }
+    for (const double radius : {1.5, 2.0, 3.0, 5.0, 8.0, 12.0})
+      if (radius >= slice_mm) tubes_row(slice_mm, radius);
 }
 
 void large() {

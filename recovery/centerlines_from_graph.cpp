@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -35,6 +36,7 @@ struct Points {
   Points3 at_mm;                       // where they are now
   Eigen::VectorXd inscribed_mm;        // distance of the voxel to the wall
   Eigen::VectorXd radius_mm;           // of the section where it is closed, otherwise 0
+  Eigen::VectorXd counted;             // the same by counting voxels, over radius_mm; 0: not known
   std::vector<bool> in_junction;       // within a junction's lumen, where sections mean nothing
 };
 
@@ -250,8 +252,7 @@ class Centerlines {
   }
 
   template <typename Use>
-  void for_sections(const Use& use) {
-    const Points3 t = tangents();
+  void for_sections(const Points3& t, const Use& use) {
     tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, t.cols(), 16),
                       [&](const tbb::blocked_range<Eigen::Index>& range) {
                         for (Eigen::Index i = range.begin(); i < range.end(); ++i)
@@ -259,18 +260,85 @@ class Centerlines {
                       });
   }
 
+  // The slab of voxels that are counted: long enough to level out slices. For radii it is a radius
+  // long, so that counts scatter less; for centres no longer than needed, since bends shift them.
+  double center_slab_mm() const { return 2.0 * voxel_mm(); }
+  double radius_slab_mm(double radius_mm) const { return std::max(radius_mm, 2.0 * voxel_mm()); }
+
   void recenter() {
-    for_sections([&](Eigen::Index i, const LumenSection& s) {
+    const std::vector<bool> clear = clear_of_junctions([&](int) { return center_slab_mm(); });
+    const Points3 t = tangents();
+    for_sections(t, [&](Eigen::Index i, const LumenSection& s) {
       points_.radius_mm[i] = s.closed ? s.radius_mm : 0.0;
-      if (s.closed) points_.at_mm.col(i) = s.center_mm;
+      if (!s.closed) return;
+      points_.at_mm.col(i) =
+          clear[static_cast<std::size_t>(i)]
+              ? counted_section(mask_, s, points_.at_mm.col(i), t.col(i), center_slab_mm())
+                    .center_mm
+              : s.center_mm;
     });
     measured_ = true;
   }
 
   void measure() {
-    for_sections([&](Eigen::Index i, const LumenSection& s) {
+    const Points3 t = tangents();
+    points_.counted = Eigen::VectorXd::Zero(t.cols());
+    for_sections(t, [&](Eigen::Index i, const LumenSection& s) {
       points_.radius_mm[i] = s.closed ? s.radius_mm : 0.0;
+      if (s.closed && s.radius_mm > 0.0)
+        points_.counted[i] =
+            counted_section(mask_, s, points_.at_mm.col(i), t.col(i), radius_slab_mm(s.radius_mm))
+                .radius_mm /
+            s.radius_mm;
     });
+    const std::vector<bool> clear =
+        clear_of_junctions([&](int i) { return radius_slab_mm(points_.radius_mm[i]); });
+    for (Eigen::Index i = 0; i < t.cols(); ++i)
+      if (!clear[static_cast<std::size_t>(i)]) points_.counted[i] = 0.0;
+  }
+
+  // Which points are farther along their branch from every junction's lumen than `reach_mm(point)`:
+  // a slab that reaches into a junction holds more than its branch.
+  template <typename Reach>
+  std::vector<bool> clear_of_junctions(const Reach& reach_mm) const {
+    std::vector<bool> clear(points_.in_junction.size(), true);
+    for (const SmoothingChain& chain : points_.chains) {
+      const std::vector<int>& u = chain.unknowns;
+      for (const bool forward : {true, false}) {
+        double since = std::numeric_limits<double>::infinity();
+        for (std::size_t k = 0; k < u.size(); ++k) {
+          const int i = u[forward ? k : u.size() - 1 - k];
+          if (k > 0)
+            since += (points_.at_mm.col(i) - points_.at_mm.col(u[forward ? k - 1 : u.size() - k]))
+                         .norm();
+          if (points_.in_junction[index(i)]) since = 0.0;
+          if (since < reach_mm(i)) clear[index(i)] = false;
+        }
+      }
+    }
+    return clear;
+  }
+
+  // Along a chain, by how much the sections' radii fall short of what counting says: the mean over
+  // two radii to both sides, since a single count scatters; 1 where nothing is known.
+  std::vector<double> corrections_of(const std::vector<int>& u) const {
+    std::vector<double> sum(u.size() + 1, 0.0), count(u.size() + 1, 0.0);
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      sum[i + 1] = sum[i] + points_.counted[u[i]];
+      count[i + 1] = count[i] + (points_.counted[u[i]] > 0.0 ? 1.0 : 0.0);
+    }
+    std::vector<double> correction(u.size(), 1.0);
+    std::vector<bool> known(u.size());
+    const double pace = graph_.grid.spacing_mm.minCoeff();
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      const auto reach = static_cast<std::size_t>(
+          std::lround(std::max(2.0 * points_.radius_mm[u[i]], 3.0 * voxel_mm()) / pace));
+      const std::size_t from = i - std::min(i, reach), to = std::min(u.size(), i + reach + 1);
+      known[i] = count[to] > count[from];
+      if (known[i]) correction[i] = (sum[to] - sum[from]) / (count[to] - count[from]);
+    }
+    if (count.back() > 0.0) fill_unknown(correction, known);
+    return correction;
   }
 
   // Radii along a chain: open sections take the value of the nearest closed ones, a median of
@@ -289,6 +357,8 @@ class Centerlines {
       any = any || known[i];
     }
     if (any) fill_unknown(r, known);
+    const std::vector<double> correction = corrections_of(u);
+    for (std::size_t i = 0; i < u.size(); ++i) r[i] *= correction[i];
     std::vector<double> clean(r);
     for (std::ptrdiff_t i = 0; i < n; ++i) {
       const std::ptrdiff_t w = std::min({std::ptrdiff_t{2}, i, n - 1 - i});
@@ -426,7 +496,8 @@ Result<CenterlineTree> centerlines_from_graph(const VesselGraph& graph, const Ma
     tree.assumptions.push_back(
         fmt::format("{} components of a single axis voxel are left out", lonely));
   tree.assumptions.push_back(
-      "radii are those of circles with the area of the mask's cross-section");
+      "radii are those of circles with the area of the mask's cross-section, which keep its "
+      "volume");
   if (options.tips == TipRule::kFlatCap)
     tree.assumptions.push_back("free ends lie where a flat cap keeps the volume of the mask");
   return tree;

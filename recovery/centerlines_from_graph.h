@@ -23,7 +23,7 @@ struct CenterlineOptions {
   // Wavelength along the branch that is halved in amplitude: this many radii, at least so many
   // voxels.
   double smoothing_radii = 2.0;
-  double smoothing_voxels = 6.0;
+  double smoothing_voxels = 8.0;
   // No point moves farther from the axis of voxels than this many local radii, or one voxel's
   // diagonal.
   double largest_move_radii = 0.5;

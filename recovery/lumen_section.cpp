@@ -1,5 +1,6 @@
 #include "recovery/lumen_section.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -103,6 +104,7 @@ LumenSection lumen_section(const Mask& mask, const Vec3& point_mm, const Vec3& n
     const Vec3 direction = std::cos(angle) * basis.u + std::sin(angle) * basis.v;
     const double d = distance_to_wall_mm(mask, point_mm, direction, longest_mm);
     section.closed = section.closed && d < longest_mm;
+    section.wall_mm[static_cast<std::size_t>(k)] = d;
     moment += d * direction;
     squares += d * d;
   }
@@ -111,6 +113,57 @@ LumenSection lumen_section(const Mask& mask, const Vec3& point_mm, const Vec3& n
   section.center_mm = point_mm + 2.0 / kSectionRays * moment;
   section.radius_mm = std::sqrt(squares / kSectionRays);
   return section;
+}
+
+CountedSection counted_section(const Mask& mask, const LumenSection& section, const Vec3& point_mm,
+                               const Vec3& normal, double reach_mm) {
+  EXPECTS(section.closed && reach_mm > 0);
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  const ImageGrid& g = mask.grid;
+  const PlaneBasis basis = plane_basis(normal);
+  // How far out a voxel's centre may lie in the direction of each ray; one voxel beyond the wall.
+  std::array<double, kSectionRays> out_mm;
+  double most_mm = 0.0;
+  for (std::size_t k = 0; k < out_mm.size(); ++k) {
+    const double angle = kTurn * static_cast<double>(k) / kSectionRays;
+    const Vec3 direction = std::cos(angle) * basis.u + std::sin(angle) * basis.v;
+    out_mm[k] = section.wall_mm[k] +
+                1.0 / (g.direction.transpose() * direction).cwiseQuotient(g.spacing_mm).norm();
+    most_mm = std::max(most_mm, out_mm[k]);
+  }
+  const Vec3 middle = g.index_vox(point_mm);
+  const Vec3 along = (g.direction.transpose() * normal).cwiseAbs();
+  Voxel low, high;
+  for (int k = 0; k < 3; ++k) {
+    // The slab's half-width and the disc's half-height along this axis of the image.
+    const double half =
+        (reach_mm * along[k] + most_mm * std::sqrt(1.0 - std::min(1.0, along[k] * along[k]))) /
+        g.spacing_mm[k];
+    const auto i = static_cast<std::size_t>(k);
+    low[i] = std::max(0, static_cast<int>(std::ceil(middle[k] - half)));
+    high[i] = std::min(g.size[i] - 1, static_cast<int>(std::floor(middle[k] + half)));
+  }
+  double weight = 0.0, weight_u = 0.0, weight_v = 0.0;
+  for (int z = low[2]; z <= high[2]; ++z)
+    for (int y = low[1]; y <= high[1]; ++y)
+      for (int x = low[0]; x <= high[0]; ++x) {
+        if (mask[{x, y, z}] == 0) continue;
+        const Vec3 d = g.world_mm(Voxel{x, y, z}) - point_mm;
+        const double s = d.dot(normal);
+        if (std::abs(s) >= reach_mm) continue;
+        const double u = d.dot(basis.u), v = d.dot(basis.v);
+        const double turn = std::atan2(v, u) / kTurn * kSectionRays;
+        const auto ray = static_cast<std::size_t>(std::lround(turn) + kSectionRays) % kSectionRays;
+        if (u * u + v * v > out_mm[ray] * out_mm[ray]) continue;
+        const double w = 0.5 * (1.0 + std::cos(std::numbers::pi * s / reach_mm));
+        weight += w;
+        weight_u += w * u;
+        weight_v += w * v;
+      }
+  if (weight == 0.0) return {point_mm, 0.0};
+  const double area = weight * g.spacing_mm.prod() / reach_mm;  // the cosine's integral
+  return {point_mm + (weight_u * basis.u + weight_v * basis.v) / weight,
+          std::sqrt(area / std::numbers::pi)};
 }
 
 }  // namespace angiospline
