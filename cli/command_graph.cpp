@@ -33,7 +33,13 @@ int run_graph(const GraphArguments& arguments) {
   }
   watch.lap("read");
   const auto vessels = vessels_from_mask(*mask, options, console.progress());
-  if (!vessels) return report_error(vessels.error());
+  if (!vessels) {
+    Error error = vessels.error();
+    const std::string& file = arguments.mask.empty() ? arguments.skeleton : arguments.mask;
+    if (error.kind != ErrorKind::kCancelled)
+      error.where = error.where.empty() ? file : file + ": " + error.where;
+    return report_error(error);
+  }
   watch.lap("graph");
   const CenterlineTree& tree = vessels->tree;
   for (const std::string& path : arguments.outputs) {

@@ -87,7 +87,7 @@ Result<Model> model_of(const CenterlineTree& tree, const RecoverArguments& argum
   std::optional<Error> unfit;
   if (arguments.fit) {
     const std::string& path = arguments.segment.image;
-    const auto file = read_image(path, {}, progress);
+    const auto file = read_image(path, reading_of(arguments.segment), progress);
     if (!file) return fail(file.error());
     FitOptions options;
     options.dark = arguments.segment.dark;
@@ -137,7 +137,7 @@ Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder&
 Result<void> write_recovery_report(const fs::path& path, const RecoverArguments& arguments,
                                    const Recovered& recovered, const Certificate& certificate,
                                    const std::vector<std::string>& files, const Stopwatch& watch) {
-  const auto file = read_image(arguments.segment.image);
+  const auto file = read_image(arguments.segment.image, reading_of(arguments.segment));
   if (!file) return fail(file.error());
   auto mesh = tessellate(recovered.model.network);
   if (!mesh) return fail(mesh.error());

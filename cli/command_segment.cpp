@@ -1,30 +1,17 @@
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
 #include "cli/commands.h"
 #include "cli/console.h"
 #include "cli/figures.h"
+#include "cli/stages.h"
 #include "io/xray_geometry_file.h"
 #include "recovery/multimodal.h"
 
 namespace angiospline::cli {
 
 namespace {
-
-// A grid over the same field of view with cubic voxels.
-ImageGrid world_grid(const ImageGrid& grid, double spacing_mm) {
-  ImageGrid world = grid;
-  world.spacing_mm = Vec3::Constant(spacing_mm);
-  for (std::size_t k = 0; k < 3; ++k)
-    world.size[k] = std::max(
-        1, static_cast<int>(std::lround(
-               grid.size[k] * grid.spacing_mm[static_cast<Eigen::Index>(k)] / spacing_mm)));
-  world.origin_mm = grid.world_mm(
-      Vec3(-0.5 * Vec3::Ones() + 0.5 * world.spacing_mm.cwiseQuotient(grid.spacing_mm)));
-  return world;
-}
 
 Image<float> in_float(const AnyImage& image) {
   Image<float> out(grid_of(image));
@@ -47,7 +34,7 @@ Result<MultimodalSegmentation> grow_with_views(const SegmentArguments& arguments
                  "give --seed and --background"});
   auto views = read_xray_views(arguments.xray);
   if (!views) return fail(views.error());
-  const auto file = read_image(arguments.image, {}, progress);
+  const auto file = read_image(arguments.image, reading_of(arguments), progress);
   if (!file) return fail(file.error());
   const ImageGrid& grid = grid_of(file->image);
   MultimodalOptions options;
@@ -62,7 +49,7 @@ Result<MultimodalSegmentation> grow_with_views(const SegmentArguments& arguments
   for (const Vec3& seed : arguments.seeds_vox) seeds.push_back(grid.world_mm(seed));
   const double edge = arguments.world_spacing_mm.value_or(0.5 * grid.spacing_mm.minCoeff());
   Modalities images{in_float(file->image), std::move(*views)};
-  return grow_region(std::move(images), world_grid(grid, edge), seeds, options, progress);
+  return grow_region(std::move(images), finer_grid(grid, edge), seeds, options, progress);
 }
 
 int segment_with_views(const SegmentArguments& arguments) {

@@ -21,6 +21,8 @@ struct CenterlineArguments {
 // How a vessel is told from its background.
 struct SegmentArguments {
   std::string image;
+  std::string series_uid;                // of a DICOM folder with several
+  std::optional<Vec3> stack_spacing_mm;  // of a stack of PNG or TIFF slices
   std::vector<Vec3> seeds_mm;
   std::vector<Vec3> seeds_vox;
   bool dark = false;
@@ -28,6 +30,7 @@ struct SegmentArguments {
   std::optional<double> deviations;  // M
   std::optional<double> background;  // grey values beyond it are never vessel
   std::optional<double> smoothing_vox;
+  bool cut_swellings = false;
   std::optional<std::int64_t> limit;  // voxels examined
   std::string xray;                   // views and their geometry, for growing in several modalities
   std::optional<double> world_spacing_mm;
@@ -129,6 +132,7 @@ struct PhantomArguments {
   std::string output;
   std::string truth;
   std::string truth_tree;
+  std::string xray;  // views to write; only for rings
   std::optional<double> snr;
   std::uint64_t random_seed = 1;
 };

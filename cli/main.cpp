@@ -44,7 +44,18 @@ void add_points(CLI::App* command, const std::string& flag, std::vector<Vec3>& p
 }
 
 void add_segment_options(CLI::App* command, SegmentArguments& a) {
-  command->add_option("IMAGE", a.image, "image file, or folder of a DICOM series")->required();
+  command
+      ->add_option("IMAGE", a.image,
+                   "image file, or folder of a DICOM series or of PNG, TIFF slices")
+      ->required();
+  command->add_option("--series", a.series_uid,
+                      "SeriesInstanceUID to take of a folder with several DICOM series");
+  command
+      ->add_option_function<std::string>(
+          "--stack-spacing",
+          [&a](const std::string& text) { a.stack_spacing_mm = parse_point(text); },
+          "voxel edges in mm of a stack of PNG or TIFF slices, which carries none")
+      ->type_name("X,Y,Z");
   add_points(command, "--seed", a.seeds_mm, "point inside the vessel in mm, LPS; may be repeated");
   add_points(command, "--seed-voxel", a.seeds_vox, "the same in voxel indices");
   command->add_flag("--dark", a.dark, "vessels are darker than their background");
@@ -55,6 +66,10 @@ void add_segment_options(CLI::App* command, SegmentArguments& a) {
   command->add_option("--background", a.background, "grey values beyond this are never vessel");
   command->add_option("--smooth", a.smoothing_vox,
                       "Gaussian smoothing before growing, in voxels (0: none)");
+  command->add_flag(
+      "--cut-swellings", a.cut_swellings,
+      "leave out what the growing reached through a neck and is much thicker than the "
+      "vessel: tissue behind a leak");
   command->add_option("--limit", a.limit, "largest number of voxels to examine");
 }
 
@@ -291,6 +306,10 @@ void add_phantom(CLI::App& app, CommandLine& line) {
   command->add_option("--snr", a.snr, "signal to noise ratio (default: no noise)")
       ->check(CLI::PositiveNumber);
   command->add_option("--random-seed", a.random_seed, "of the noise and of the random shapes");
+  command->add_option("--xray", a.xray,
+                      "rings only: the experiment of two modalities (thesis 7.1); writes this JSON "
+                      "file of four X-ray views and their images beside it; signal is lost in the "
+                      "volume and in the views, and --truth has half the volume's voxel edge");
   command->callback([&line] { line.verb = [&line] { return run_phantom(line.phantom); }; });
 }
 
@@ -299,7 +318,7 @@ void add_reproduce(CLI::App& app, CommandLine& line) {
       "reproduce", "the thesis's experiments on phantoms, its figures beside ours");
   ReproduceArguments& a = line.reproduce;
   command->add_option("TABLE", a.tables,
-                      "7.1 7.2 7.3 7.4 7.5 cylinder potato 7.6 vessel bifurcation smoothing "
+                      "7.1 rings 7.2 7.3 7.4 7.5 cylinder potato 7.6 vessel bifurcation smoothing "
                       "(default: all)");
   command->add_flag("--quick", a.quick, "a few rows and iterations only, to see that it runs");
   command->add_option("--random-seed", a.random_seed, "of the noise");

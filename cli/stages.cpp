@@ -15,11 +15,19 @@ SegmentOptions segment_options(const SegmentArguments& arguments, const ImageGri
   options.deviations = arguments.deviations;
   options.background = arguments.background;
   if (arguments.smoothing_vox) options.smoothing_vox = *arguments.smoothing_vox;
+  options.cut_swellings = arguments.cut_swellings;
   if (arguments.limit) options.max_examined = static_cast<std::size_t>(*arguments.limit);
   return options;
 }
 
 }  // namespace
+
+ReadImageOptions reading_of(const SegmentArguments& arguments) {
+  ReadImageOptions options;
+  options.series_uid = arguments.series_uid;
+  options.stack_spacing_mm = arguments.stack_spacing_mm;
+  return options;
+}
 
 void Stopwatch::lap(std::string stage) {
   const auto now = std::chrono::steady_clock::now();
@@ -29,7 +37,7 @@ void Stopwatch::lap(std::string stage) {
 
 Result<Segmented> segment_image(const SegmentArguments& arguments, const Progress& progress,
                                 Stopwatch& watch) {
-  auto file = read_image(arguments.image, {}, progress);
+  auto file = read_image(arguments.image, reading_of(arguments), progress);
   if (!file) return fail(file.error());
   watch.lap("read");
   const SegmentOptions options = segment_options(arguments, grid_of(file->image));

@@ -26,6 +26,9 @@ class Stopwatch {
   std::vector<std::pair<std::string, double>> laps_;
 };
 
+// How the image of a segmentation is to be read where its files leave that open.
+ReadImageOptions reading_of(const SegmentArguments& arguments);
+
 // Reads the image and segments it at the seeds. Errors: those of the verbs, with the file's name.
 Result<Segmented> segment_image(const SegmentArguments& arguments, const Progress& progress,
                                 Stopwatch& watch);

@@ -148,4 +148,23 @@ Result<std::vector<XrayView>> read_xray_views(const std::filesystem::path& path)
   return views;
 }
 
+Result<void> write_xray_views(const std::vector<XrayView>& views,
+                              const std::filesystem::path& path) {
+  const auto list = [](const auto& v) { return std::vector<double>(v.begin(), v.end()); };
+  Json json{{"schema", 1}, {"views", Json::array()}};
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    const XrayGeometry& g = views[k].geometry;
+    const std::string name = fmt::format("{}_{}.mha", path.stem().string(), k + 1);
+    if (const auto written = write_image(views[k].image, path.parent_path() / name); !written)
+      return fail(written.error());
+    json["views"].push_back({{"image", name},
+                             {"source_mm", list(g.source_mm)},
+                             {"first_pixel_mm", list(g.first_pixel_mm)},
+                             {"column_axis", list(g.column_axis)},
+                             {"row_axis", list(g.row_axis)},
+                             {"pixel_mm", list(g.pixel_mm)}});
+  }
+  return write_file(path, json.dump(2) + "\n");
+}
+
 }  // namespace angiospline

@@ -21,4 +21,10 @@ namespace angiospline {
 // or pixels not positive, axes that are zero or parallel, image errors.
 Result<std::vector<XrayView>> read_xray_views(const std::filesystem::path& path);
 
+// Writes such a file, with source and detector in full, and the images NAME_1.mha, NAME_2.mha, ...
+// beside it, where NAME is the file's own without its suffix. Reading it gives the same views.
+// Error: kCannotWrite.
+Result<void> write_xray_views(const std::vector<XrayView>& views,
+                              const std::filesystem::path& path);
+
 }  // namespace angiospline

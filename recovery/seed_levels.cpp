@@ -105,7 +105,7 @@ std::optional<SeedLevels> levels_at(const AnyImage& image, const Voxel& seed, do
                                     double smoothing_mm) {
   const ImageGrid& grid = grid_of(image);
   const double voxel = grid.spacing_mm.minCoeff();
-  for (double half = 5; half <= 40; half *= 1.4) {
+  for (double half = 5; half <= 80; half *= 1.4) {
     const Cube cube = cube_around(image, seed, half * voxel, sign, smoothing_mm);
     if (cube.values.size() < 27) continue;
     const double threshold = otsu_threshold(cube.values);

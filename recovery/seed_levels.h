@@ -9,8 +9,8 @@
 
 namespace angiospline::segmentation {
 
-// Grey values (sign * the image's, smoothed) around one voxel; none if no cube up to 40 voxels
-// shows a background.
+// Grey values (sign * the image's, smoothed) around one voxel; none if no cube of up to 75 voxels
+// to each side shows a background.
 std::optional<SeedLevels> levels_at(const AnyImage& image, const Voxel& seed, double sign,
                                     double smoothing_mm);
 

@@ -90,6 +90,12 @@ Result<Vessels> vessels_from_mask(const Mask& given, const VesselsOptions& optio
   if (vessels.before.components == 0)
     return fail(
         {ErrorKind::kBadInput, "mask is empty", {}, {}, "at least one voxel must be foreground"});
+  if (std::find(given.voxels.begin(), given.voxels.end(), 0) == given.voxels.end())
+    return fail({ErrorKind::kBadInput,
+                 "mask is full",
+                 {},
+                 "no voxel is background",
+                 "a vessel has a wall within the image"});
   Result<PrunedSkeleton> pruned = pruned_axis(given, options, progress);
   if (!pruned) return fail(pruned.error());
   vessels.contacts = find_contacts(pruned->graph, given);

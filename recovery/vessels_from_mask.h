@@ -45,7 +45,7 @@ struct Vessels {
 };
 
 // Everything between a mask and its centerline tree. The mask is used as it is: fill its cavities
-// and holes first. Errors: an empty mask; no branch; a skeleton
+// and holes first. Errors: an empty or full mask; no branch; a skeleton
 // on another grid; stopped on request.
 Result<Vessels> vessels_from_mask(const Mask& mask, const VesselsOptions& options = {},
                                   const Progress& progress = {});

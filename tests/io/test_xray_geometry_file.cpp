@@ -47,6 +47,30 @@ TEST_F(XrayFiles, BothWaysToStateAViewAgree) {
   EXPECT_EQ((*views)[0].image.voxels[5], 0.25F);
 }
 
+TEST_F(XrayFiles, ViewsThatAreWrittenAreReadAgain) {
+  std::vector<XrayView> views;
+  for (const double angle : {0.0, 80.0}) {
+    CArm arm;
+    arm.angle_deg = angle;
+    arm.centre_mm = Vec3(1, 2, 3);
+    arm.pixel_mm = 0.8;
+    arm.pixels = 8;
+    Image<float> image;
+    image.grid.size = {8, 8, 1};
+    for (int i = 0; i < 64; ++i) image.voxels.push_back(static_cast<float>(angle + i) / 3);
+    views.push_back({c_arm_geometry(arm), image});
+  }
+  ASSERT_TRUE(write_xray_views(views, folder_ / "out.json").has_value());
+  const auto again = read_xray_views(folder_ / "out.json");
+  ASSERT_TRUE(again.has_value()) << again.error().message();
+  ASSERT_EQ(again->size(), views.size());
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    EXPECT_EQ((*again)[k].image.voxels, views[k].image.voxels);
+    const Vec3 p(4, -1, 10);
+    EXPECT_TRUE((*again)[k].geometry.project(p)->isApprox(*views[k].geometry.project(p), 1e-12));
+  }
+}
+
 TEST_F(XrayFiles, ErrorsNameViewAndField) {
   const std::string arm =
       R"("angle_deg": 0, "centre_mm": [1, 2, 3], "source_to_centre_mm": 700, "source_to_detector_mm": 1000)";

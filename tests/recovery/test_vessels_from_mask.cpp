@@ -208,6 +208,11 @@ TEST(VesselsFromMask, say_what_is_wrong_with_a_mask_that_has_no_vessel) {
   const auto empty = vessels_from_mask(empty_mask({5, 5, 5}));
   ASSERT_FALSE(empty.has_value());
   EXPECT_EQ(empty.error().message(), "mask is empty (at least one voxel must be foreground)");
+  Mask whole = empty_mask({5, 5, 5});
+  std::fill(whole.voxels.begin(), whole.voxels.end(), std::uint8_t{1});
+  const auto full = vessels_from_mask(whole);
+  ASSERT_FALSE(full.has_value());
+  EXPECT_NE(full.error().message().find("mask is full"), std::string::npos);
   const auto voxel = vessels_from_mask(test::mask_of({5, 5, 5}, {{2, 2, 2}}));
   ASSERT_FALSE(voxel.has_value());
   EXPECT_NE(voxel.error().message().find("no branch"), std::string::npos);
