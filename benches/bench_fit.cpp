@@ -1,145 +1,310 @@
-// How near the default fit comes to analytic truths, and how long it takes.
-//   bench_fit [phantom ...]      cylinder, bent, bifurcation, tree; all without arguments
+// How near the default fit comes to analytic truths, beside marching cubes on the same images.
+//   bench_fit table [phantom ...]   every phantom at every SNR: cylinder potato bent bifurcation
+//   tree bench_fit crowded               neighbours, unequal voxels, a ramp, Rician noise: bent
+//   tube, SNR 8, 4 bench_fit starts [phantom ...]  displaced and resized starts at SNR 8 and 4
+//   bench_fit own                   bifurcation and tree from their own segmentation, SNR 8
+// SEEDS=n: noise seeds (default 3); FIRST=n: the first of them (default 1); SNR=x: only this one.
+#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <numbers>
+#include <cstdlib>
 #include <string>
 #include <vector>
+
+#include "benches/fit_phantoms.h"
+#include <fmt/format.h>
 
 #include "modeling/certificate.h"
 #include "modeling/seed_model.h"
 #include "modeling/tessellation.h"
+#include "recovery/closed_surface.h"
 #include "recovery/fit_model.h"
-#include "recovery/phantom.h"
-#include "recovery/rasterize.h"
+#include "recovery/gaussian.h"
+#include "recovery/morphology.h"
+#include "recovery/segmentation.h"
+#include "recovery/vessels_from_mask.h"
 
 namespace angiospline {
 namespace {
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+double from_environment(const char* name, double otherwise) {
+  const char* value = std::getenv(name);
+  return value != nullptr ? std::atof(value) : otherwise;
 }
+std::uint64_t first_seed() { return static_cast<std::uint64_t>(from_environment("FIRST", 1)); }
+int seeds() { return static_cast<int>(from_environment("SEEDS", 3)); }
+bool wanted_snr(double snr) { return snr == from_environment("SNR", snr); }
 
-// Distance to the union of the tree's round cones, negative inside.
-double distance_to(const CenterlineTree& tree, const Vec3& p) {
-  double least = 1e300;
-  for (const CenterlineBranch& b : tree.branches) {
-    for (Eigen::Index k = 0; k + 1 < b.points_mm.cols(); ++k) {
-      const Vec3 a = b.points_mm.col(k), d = b.points_mm.col(k + 1) - a;
-      const double t = std::clamp(d.dot(p - a) / d.squaredNorm(), 0.0, 1.0);
-      const double r = (1 - t) * b.radii_mm(k) + t * b.radii_mm(k + 1);
-      least = std::min(least, (p - a - t * d).norm() - r);
-    }
+struct Kind {
+  const char* name;
+  PhantomKind kind;
+};
+constexpr Kind kKinds[] = {{"cylinder", PhantomKind::kCylinder},
+                           {"potato", PhantomKind::kPotato},
+                           {"bent", PhantomKind::kBentVessel},
+                           {"bifurcation", PhantomKind::kBifurcation},
+                           {"tree", PhantomKind::kRandomTree}};
+
+// Voxels above the middle of the grey values after smoothing: where a closed surface starts.
+Mask rough_mask(const Image<float>& image) {
+  const Image<float> smooth = smoothed(Image<float>(image), 1.5);
+  Mask mask(image.grid);
+  for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
+    mask.voxels[i] = static_cast<double>(smooth.voxels[i]) > kBackground + kContrast / 2;
   }
-  return least;
+  return mask;
 }
 
-struct Accuracy {
-  double mean = 0, p95 = 0, bias = 0, missed_percent = 0;
+Result<Model> start_of(const FitPhantom& phantom, const Image<float>& image) {
+  if (!phantom.tree.branches.empty()) return seed_model(phantom.tree);
+  return closed_model(largest_component(rough_mask(image)));  // the others are noise
+}
+
+struct Outcome {
+  Accuracy accuracy;
+  double missed = 0, seconds = 0;
+  int control_points = 0, numbers = 0, nodes = 0;
+  double freedom = 0, wave = 0, angle_deg = 0, jacobian = 1;
+  bool sound = true;
+  std::string told;
 };
 
-Accuracy accuracy_of(const SurfaceNetwork& network, const CenterlineTree& truth, double margin) {
+// Coordinates of the control points and interior knots of the patches.
+int numbers_of(const SurfaceNetwork& network) {
+  auto count = 3 * static_cast<int>(network.control_points_mm.cols());
+  for (const Patch& p : network.patches) {
+    count += p.u.control_point_count() + p.v.control_point_count() - 12;
+  }
+  return count;
+}
+
+Result<Outcome> outcome(const FitPhantom& phantom, const Model& start, const Image<float>& image) {
+  const auto before = std::chrono::steady_clock::now();
+  FitOptions options;
+  if (std::getenv("WAVE")) options.displacement.wave_factors = {from_environment("WAVE", 1)};
+  const auto fitted = fit_model(start, image, options);
+  if (!fitted) return fail(fitted.error());
+  Outcome o;
+  o.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
+  const SurfaceNetwork& network = fitted->model.network;
   const auto mesh = tessellate(network);
-  std::vector<std::pair<double, double>> distances;
-  double area = 0, sum = 0, bias = 0;
-  for (Eigen::Index t = 0; t < mesh->mesh.triangles.cols(); ++t) {
-    if (!is_wall(
-            mesh->mesh
-                .parts[static_cast<std::size_t>(mesh->mesh.part_of[static_cast<std::size_t>(t)])]
-                .kind))
-      continue;
-    const Eigen::Vector3i c = mesh->mesh.triangles.col(t);
-    const Vec3 a = mesh->mesh.points_mm.col(c(0)), b = mesh->mesh.points_mm.col(c(1)),
-               d = mesh->mesh.points_mm.col(c(2));
-    const Vec3 middle = (a + b + d) / 3;
-    bool near_end = false;
-    for (const Rim& rim : network.rims) {
-      near_end = near_end || std::abs((middle - rim.center_mm).dot(rim.normal)) < margin;
+  const auto certificate = certify(network);
+  o.accuracy = accuracy(phantom, mesh->mesh, network.rims);
+  o.missed = missed_percent(phantom, mesh->mesh);
+  o.control_points = fitted->report.control_points;
+  o.numbers = numbers_of(network);
+  o.nodes = fitted->report.nodes;
+  o.freedom = fitted->report.degrees_of_freedom;
+  o.wave = fitted->report.wave_factor;
+  o.angle_deg = certificate->max_normal_angle_deg;
+  o.jacobian = certificate->min_jacobian_ratio;
+  o.sound = certificate->closed && certificate->valid && !certificate->self_intersecting;
+  for (const HeldRegion& h : fitted->report.held) o.told += "   " + h.name + ": " + h.why + "\n";
+  for (const std::string& h : fitted->report.without_edge) o.told += "   " + h + ": no edge\n";
+  return o;
+}
+
+void table(const std::vector<std::string>& only) {
+  std::printf(
+      "mean distance to the truth in voxels (marching cubes at its best threshold); missed: "
+      "percent "
+      "of the truth's voxels\n"
+      "phantom     SNR    ours    p95    bias missed | cubes   at | ours/cubes | points numbers "
+      "nodes "
+      "cubes' ratio stl | G1 deg    J   s\n");
+  for (const Kind& kind : kKinds) {
+    if (!only.empty() && std::find(only.begin(), only.end(), kind.name) == only.end()) continue;
+    const FitPhantom phantom = fit_phantom(kind.kind);
+    for (const double snr : {0.0, 8.0, 4.0, 2.0, 1.0}) {
+      if (!wanted_snr(snr)) continue;
+      const int repeats = snr > 0 ? seeds() : 1;
+      Outcome sum;
+      double cubes = 0, cube_numbers = 0, stl = 0, threshold = 0;
+      int done = 0;
+      for (int k = 0; k < repeats; ++k) {
+        const Image<float> image =
+            with_noise(phantom, snr, first_seed() + static_cast<std::uint64_t>(k));
+        const auto start = start_of(phantom, image);
+        if (!start) {
+          std::printf("%s\n", start.error().message().c_str());
+          continue;
+        }
+        const auto o = outcome(phantom, *start, image);
+        if (!o) {
+          std::printf("%s\n", o.error().message().c_str());
+          continue;
+        }
+        const MarchingCubes peer = marching_cubes(phantom, image);
+        sum.accuracy.mean_vox += o->accuracy.mean_vox;
+        sum.accuracy.p95_vox += o->accuracy.p95_vox;
+        sum.accuracy.bias_vox += o->accuracy.bias_vox;
+        sum.missed += o->missed;
+        sum.seconds += o->seconds;
+        sum.control_points += o->control_points;
+        sum.numbers += o->numbers;
+        sum.nodes += o->nodes;
+        sum.angle_deg = std::max(sum.angle_deg, o->angle_deg);
+        sum.jacobian = std::min(sum.jacobian, o->jacobian);
+        sum.sound = sum.sound && o->sound;
+        sum.told += o->told;
+        sum.wave = o->wave;
+        sum.freedom = o->freedom;
+        cubes += peer.accuracy.mean_vox;
+        threshold += peer.threshold;
+        cube_numbers += 3.0 * static_cast<double>(peer.points + peer.triangles);
+        stl += 12.0 * static_cast<double>(peer.triangles);
+        ++done;
+      }
+      if (done == 0) continue;
+      std::printf(
+          "%-11s %3.0f  %.4f %.4f %+.4f %5.2f | %.4f %.2f | %.2f | %d %d %d %.0f %.0f %.0f | %.1g "
+          "%.2f %.2f%s wave %.1f dof %.0f\n",
+          kind.name, snr, sum.accuracy.mean_vox / done, sum.accuracy.p95_vox / done,
+          sum.accuracy.bias_vox / done, sum.missed / done, cubes / done, threshold / done,
+          sum.accuracy.mean_vox / cubes, sum.control_points / done, sum.numbers / done,
+          sum.nodes / done, cube_numbers / done, cube_numbers / sum.numbers, stl / sum.numbers,
+          sum.angle_deg, sum.jacobian, sum.seconds / done, sum.sound ? "" : " UNSOUND", sum.wave,
+          sum.freedom);
+      std::printf("%s", sum.told.c_str());
+      std::fflush(stdout);
     }
-    const double weight = (b - a).cross(d - a).norm() / 2;
-    if (near_end) continue;
-    double distance = 0;
-    for (const Vec3& p : {a, b, d}) distance += distance_to(truth, p) / 3;
-    distances.emplace_back(std::abs(distance), weight);
-    sum += weight * std::abs(distance);
-    bias += weight * distance;
-    area += weight;
   }
-  std::sort(distances.begin(), distances.end());
-  double seen = 0, p95 = 0;
-  for (const auto& [distance, weight] : distances) {
-    seen += weight;
-    p95 = distance;
-    if (seen >= 0.95 * area) break;
-  }
-  return {sum / area, p95, bias / area, 0};
 }
 
-Image<float> as_float(const Image<std::int16_t>& image) {
-  Image<float> f(image.grid);
-  for (std::size_t i = 0; i < f.voxels.size(); ++i) f.voxels[i] = image.voxels[i];
-  return f;
+// The mean over seeds of the mean distance, and soundness.
+double mean_of(const FitPhantom& phantom, const std::function<Image<float>(std::uint64_t)>& image) {
+  double sum = 0;
+  for (int k = 0; k < seeds(); ++k) {
+    const Image<float> noisy = image(first_seed() + static_cast<std::uint64_t>(k));
+    const auto start = start_of(phantom, noisy);
+    const auto o = start ? outcome(phantom, *start, noisy) : Result<Outcome>(fail(start.error()));
+    if (!o) {
+      std::printf("%s\n", o.error().message().c_str());
+      return -1;
+    }
+    sum += o->accuracy.mean_vox / seeds();
+  }
+  return sum;
 }
 
-void run(const std::string& name, PhantomKind kind, int seeds) {
-  for (const double snr : {0.0, 8.0, 4.0, 2.0, 1.0}) {
-    if (const char* only = std::getenv("SNR"); only != nullptr && std::atof(only) != snr) continue;
-    double mean = 0, bias = 0, p95 = 0, seconds = 0, before = 0, worst_angle = 0,
-           least_jacobian = 1;
-    int count = 0, held = 0, unsound = 0;
-    FitReport report;
-    std::string told;
-    for (int seed_number = 1; seed_number <= (snr > 0 ? seeds : 1); ++seed_number) {
-      PhantomOptions options;
-      if (snr > 0) options.snr = snr;
-      options.seed = kind == PhantomKind::kRandomTree ? 3 : static_cast<std::uint64_t>(seed_number);
-      if (kind == PhantomKind::kRandomTree) {
-        options.ends = 10;
-        options.field_mm = 128;
+void crowded() {
+  std::printf(
+      "mean distance in voxels (of the voxel's volume); in brackets over the isolated one\n");
+  const FitPhantom alone = fit_phantom(PhantomKind::kBentVessel);
+  const FitPhantom pair = bent_pair();
+  const FitPhantom tall = fit_phantom(PhantomKind::kBentVessel, Vec3(1, 1, 2));
+  const FitPhantom wide = fit_phantom(PhantomKind::kCylinder);
+  const FitPhantom tall_wide = fit_phantom(PhantomKind::kCylinder, Vec3(1, 1, 2));
+  for (const double snr : {8.0, 4.0}) {
+    if (!wanted_snr(snr)) continue;
+    for (const auto& [name, base, unequal] :
+         {std::tuple{"bent", &alone, &tall}, std::tuple{"cylinder", &wide, &tall_wide}}) {
+      const auto noisy = [snr](const FitPhantom& p) {
+        return [&p, snr](std::uint64_t s) { return with_noise(p, snr, s); };
+      };
+      const double isolated = mean_of(*base, noisy(*base));
+      std::printf("%-8s SNR %.0f  isolated %.4f", name, snr, isolated);
+      const auto row = [&](const char* what, double mean) {
+        std::printf("  %s %.4f (%.2f)", what, mean, mean / isolated);
+        std::fflush(stdout);
+      };
+      if (base == &alone) row("neighbour", mean_of(pair, noisy(pair)));
+      row("1:1:2", mean_of(*unequal, noisy(*unequal)));
+      row("ramp", mean_of(*base, [&](std::uint64_t s) { return with_ramp(*base, snr, s); }));
+      row("Rician",
+          mean_of(*base, [&](std::uint64_t s) { return with_rician_noise(*base, snr, s); }));
+      std::printf("\n");
+    }
+  }
+}
+
+// The tree moved sideways and resized.
+CenterlineTree displaced(CenterlineTree tree, const Vec3& by, double factor) {
+  for (CenterlineNode& n : tree.nodes) n.position_mm += by;
+  for (CenterlineBranch& b : tree.branches) {
+    b.points_mm.colwise() += by;
+    b.radii_mm *= factor;
+  }
+  return tree;
+}
+
+void starts(const std::vector<std::string>& only) {
+  std::printf("mean distance in voxels from starts displaced and resized\n");
+  for (const Kind& kind : kKinds) {
+    if (kind.kind == PhantomKind::kPotato || kind.kind == PhantomKind::kRandomTree) continue;
+    if (!only.empty() && std::find(only.begin(), only.end(), kind.name) == only.end()) continue;
+    const FitPhantom phantom = fit_phantom(kind.kind);
+    for (const double snr : {8.0, 4.0}) {
+      if (!wanted_snr(snr)) continue;
+      const Image<float> image = with_noise(phantom, snr, first_seed());
+      double worst = 0, sum = 0;
+      int count = 0, failed = 0;
+      for (const double size : {0.0, 1.5, 3.0}) {
+        for (const Vec3& way : {Vec3(1, 0, 0), Vec3(-0.6, 0.8, 0), Vec3(0, -1, 0)}) {
+          if (size == 0 && way.x() != 1) continue;
+          for (const double factor : {0.5, 1.0, 1.5}) {
+            const auto start = seed_model(displaced(phantom.tree, size * way, factor));
+            const auto o =
+                start ? outcome(phantom, *start, image) : Result<Outcome>(fail(start.error()));
+            const std::string what =
+                fmt::format("{} by {:.1f} along ({:.1f}, {:.1f}, {:.1f}), radius x {:.1f}",
+                            kind.name, size, way.x(), way.y(), way.z(), factor);
+            ++count;
+            if (!o) {
+              std::printf("   %s: %s\n", what.c_str(), o.error().message().c_str());
+              ++failed;
+              continue;
+            }
+            worst = std::max(worst, o->accuracy.mean_vox);
+            sum += o->accuracy.mean_vox;
+            if (o->accuracy.mean_vox > (snr > 4 ? 0.1 : 0.15) || !o->sound) {
+              std::printf("   %s: %.3f%s\n%s", what.c_str(), o->accuracy.mean_vox,
+                          o->sound ? "" : " UNSOUND", o->told.c_str());
+            }
+          }
+        }
       }
-      const auto phantom = make_phantom(kind, options);
-      if (!phantom) {
-        std::printf("%s\n", phantom.error().message().c_str());
-        return;
-      }
-      const auto seed = seed_model(phantom->tree);
-      const Image<float> image = as_float(phantom->image);
-      FitOptions fit;
-      if (const char* r = std::getenv("ROUNDS")) fit.rounds = std::atoi(r);
-      if (const char* r = std::getenv("WAVE")) fit.displacement.wave_factors = {std::atof(r)};
-      const auto start = std::chrono::steady_clock::now();
-      const auto fitted = fit_model(*seed, image, fit);
-      seconds += seconds_since(start);
-      if (!fitted) {
-        std::printf("%s\n", fitted.error().message().c_str());
+      std::printf("%-11s SNR %.0f: %d starts, %d failed, mean %.4f, worst %.4f\n", kind.name, snr,
+                  count, failed, sum / std::max(1, count - failed), worst);
+      std::fflush(stdout);
+    }
+  }
+}
+
+void own() {
+  std::printf("from their own segmentation at SNR 8, mean distance in voxels\n");
+  for (const Kind& kind : kKinds) {
+    if (kind.kind != PhantomKind::kBifurcation && kind.kind != PhantomKind::kRandomTree) continue;
+    const FitPhantom phantom = fit_phantom(kind.kind);
+    for (int k = 0; k < seeds(); ++k) {
+      const Image<float> image =
+          with_noise(phantom, 8, first_seed() + static_cast<std::uint64_t>(k));
+      const auto segmented = segment(AnyImage(image));
+      if (!segmented) {
+        std::printf("%s\n", segmented.error().message().c_str());
         continue;
       }
-      before += accuracy_of(seed->network, phantom->tree, 2).mean;
-      const Accuracy after = accuracy_of(fitted->model.network, phantom->tree, 2);
-      mean += after.mean;
-      bias += after.bias;
-      p95 += after.p95;
-      ++count;
-      const auto certificate = certify(fitted->model.network);
-      worst_angle = std::max(worst_angle, certificate->max_normal_angle_deg);
-      least_jacobian = std::min(least_jacobian, certificate->min_jacobian_ratio);
-      unsound += !certificate->closed || !certificate->valid || certificate->self_intersecting;
-      report = fitted->report;
-      held += static_cast<int>(report.held.size());
-      for (const HeldRegion& h : report.held) told += "   " + h.name + ": " + h.why + "\n";
-      for (const std::string& h : report.without_edge) told += "   " + h + ": no edge\n";
+      const auto vessels = vessels_from_mask(segmented->mask);
+      const auto start = vessels ? seed_model(vessels->tree) : Result<Model>(fail(vessels.error()));
+      if (!start) {
+        std::printf("%s\n", start.error().message().c_str());
+        continue;
+      }
+      const auto o = outcome(phantom, *start, image);
+      if (!o) {
+        std::printf("%s\n", o.error().message().c_str());
+        continue;
+      }
+      const auto mesh = tessellate(start->network);
+      std::printf(
+          "%-11s seed %d: %d branches, seeded %.4f -> %.4f (p95 %.4f, bias %+.4f), G1 %.1g deg, J "
+          "%.2f, %.1f s%s\n%s",
+          kind.name, k, static_cast<int>(vessels->tree.branches.size()),
+          accuracy(phantom, mesh->mesh, start->network.rims).mean_vox, o->accuracy.mean_vox,
+          o->accuracy.p95_vox, o->accuracy.bias_vox, o->angle_deg, o->jacobian, o->seconds,
+          o->sound ? "" : " UNSOUND", o->told.c_str());
+      std::fflush(stdout);
     }
-    if (count == 0) continue;
-    std::printf(
-        "%-11s SNR %3.1f (%.2f): seed %.4f -> mean %.4f p95 %.4f bias %+.4f G1 %.1g deg J %.2f "
-        "unsound %d held %d nodes %d cps %d wave %.1f dof %.0f contrast %.0f  %.2f s\n",
-        name.c_str(), snr, report.snr, before / count, mean / count, p95 / count, bias / count,
-        worst_angle, least_jacobian, unsound, held, report.nodes, report.control_points,
-        report.wave_factor, report.degrees_of_freedom, report.contrast, seconds / count);
-    std::printf("%s", told.c_str());
-    std::fflush(stdout);
   }
 }
 
@@ -147,18 +312,10 @@ void run(const std::string& name, PhantomKind kind, int seeds) {
 }  // namespace angiospline
 
 int main(int argc, char** argv) {
-  using namespace angiospline;
-  const auto wanted = [&](const char* name) {
-    if (argc == 1) return true;
-    for (int k = 1; k < argc; ++k) {
-      if (std::strcmp(argv[k], name) == 0) return true;
-    }
-    return false;
-  };
-  const char* repeats = std::getenv("SEEDS");
-  const int seeds = repeats != nullptr ? std::atoi(repeats) : 4;
-  if (wanted("cylinder")) run("cylinder", PhantomKind::kCylinder, seeds);
-  if (wanted("bent")) run("bent", PhantomKind::kBentVessel, seeds);
-  if (wanted("bifurcation")) run("bifurcation", PhantomKind::kBifurcation, seeds);
-  if (wanted("tree")) run("tree", PhantomKind::kRandomTree, seeds);
+  const std::string mode = argc > 1 ? argv[1] : "";
+  const std::vector<std::string> only(argv + std::min(argc, 2), argv + argc);
+  if (mode.empty() || mode == "table") angiospline::table(only);
+  if (mode.empty() || mode == "crowded") angiospline::crowded();
+  if (mode.empty() || mode == "starts") angiospline::starts(only);
+  if (mode.empty() || mode == "own") angiospline::own();
 }

@@ -9,10 +9,14 @@
 #include "cli/console.h"
 #include "cli/figures.h"
 #include "cli/model_stages.h"
+#include "cli/stages.h"
 #include "io/certificate_json.h"
 #include "io/glb_file.h"
 #include "io/model_file.h"
 #include "io/vtk_file.h"
+#include "recovery/closed_surface.h"
+#include "recovery/deform_model.h"
+#include "recovery/fit_figures.h"
 #include "recovery/fit_model.h"
 #include "recovery/metrics.h"
 #include "recovery/voxelize.h"
@@ -40,51 +44,169 @@ Result<MaskComparison> compare_with_truth(const Model& model, const ImageGrid& g
   return compare_masks(*truth, voxelized(mesh->mesh, truth->grid));
 }
 
-// The mean of |residual| over the points where it is known, and the file if one is wanted.
-Result<double> tell_residual(const Model& model, const Image<float>& image,
-                             const FitOptions& options, const std::string& path,
-                             const Progress& progress) {
-  const auto tessellation = tessellate(model.network, {}, progress);
-  if (!tessellation) return fail(tessellation.error());
-  const MeshField residual = wall_residual(model, *tessellation, image, options);
-  double sum = 0, count = 0;
-  for (const double r : residual.values) {
-    if (std::isfinite(r)) sum += std::abs(r), count += 1;
-  }
-  if (!path.empty()) {
-    const auto written = fs::path(path).extension() == ".glb"
-                             ? write_glb(path, tessellation->mesh, {model.name, residual})
-                             : write_vtk_mesh(path, tessellation->mesh, {residual});
-    if (!written) return fail(written.error());
-  }
-  return count > 0 ? sum / count : 0.0;
+Result<void> write_residual(const std::string& path, const std::string& name,
+                            const TriangleMesh& mesh, const MeshField& residual) {
+  if (path.empty()) return {};
+  return fs::path(path).extension() == ".glb" ? write_glb(path, mesh, {name, residual})
+                                              : write_vtk_mesh(path, mesh, {residual});
 }
 
-Json fit_json(const FitReport& report, double mean_residual_mm) {
+// A model, and what its fit has to say.
+struct Fitted {
+  Model model;
+  std::vector<PartFigures> parts;  // the last one: all
+  bool converged = false;
+  int iterations = 0;
+  const char* force_unit = "mm";
+  Json details;                          // of the way it was fitted
+  std::string summary;                   // for people
+  std::vector<std::string> unconverged;  // parts that were held or have no wall near them
+
+  bool converged_part(const std::string& name) const {
+    const bool named = std::find(unconverged.begin(), unconverged.end(), name) != unconverged.end();
+    return !named && (converged || !unconverged.empty());
+  }
+};
+
+Json report_json(const FitReport& report) {
   Json held = Json::array();
   for (const HeldRegion& h : report.held) held.push_back({{"region", h.name}, {"why", h.why}});
-  return {{"contrast", report.contrast},
+  return {{"method", "wall"},
+          {"contrast", report.contrast},
           {"noise", report.noise},
           {"snr", report.snr},
           {"mesh_nodes", report.nodes},
           {"control_points", report.control_points},
+          {"control_points_before_reduction", report.control_points_before_reduction},
+          {"reduction_mm", report.reduction_mm},
           {"wave_factor", report.wave_factor},
           {"degrees_of_freedom", report.degrees_of_freedom},
           {"mean_axis_move_mm", report.mean_axis_move_mm},
           {"mean_move_mm", report.mean_move_mm},
-          {"mean_residual_mm", mean_residual_mm},
           {"without_edge", report.without_edge},
           {"recaptured", report.recaptured},
           {"held", held}};
 }
 
-Json truth_json(const MaskComparison& c) {
-  Json json = {{"missed_percent", c.missed_percent}, {"dice", c.dice}};
-  if (c.surface) {
-    json["mean_surface_distance_mm"] = c.surface->mean_mm;
-    json["surface_distance_95_mm"] = c.surface->hausdorff95_mm;
+// The default fit; what the image still asks for is its residual.
+Result<Fitted> fit_walls(const Model& model, const Image<float>& image,
+                         const FitArguments& arguments, const Progress& progress) {
+  constexpr double kConverged = 0.1;  // voxels that the image still asks for, in the mean
+  FitOptions options;
+  options.dark = arguments.dark;
+  options.capture = arguments.capture;
+  auto fitted = fit_model(model, image, options, progress);
+  if (!fitted) return fail(fitted.error());
+  const auto before = tessellate(model.network, {}, progress);
+  if (!before) return fail(before.error());
+  const auto mesh = tessellate(fitted->model.network, {}, progress);
+  if (!mesh) return fail(mesh.error());
+  const MeshField residual = wall_residual(fitted->model, *mesh, image, options);
+  if (auto written = write_residual(arguments.residual, fitted->model.name, mesh->mesh, residual);
+      !written) {
+    return fail(written.error());
   }
-  return json;
+  const FitReport& report = fitted->report;
+  Fitted result;
+  result.parts = part_figures(mesh->mesh, residual, before->mesh);
+  const double left = result.parts.back().residual_mean;
+  result.converged = left < kConverged * std::cbrt(image.grid.spacing_mm.prod()) &&
+                     report.held.empty() && report.without_edge.empty();
+  for (const HeldRegion& h : report.held) result.unconverged.push_back(h.name);
+  for (const std::string& name : report.without_edge) result.unconverged.push_back(name);
+  result.iterations = report.iterations;
+  result.details = report_json(report);
+  result.details["mean_residual_mm"] = left;
+  result.summary = fmt::format(
+      "SNR {:.3g}; axes moved {:.3g} mm, walls {:.3g} mm; {:.3g} mm left; {} control points "
+      "({} before data reduction)",
+      report.snr, report.mean_axis_move_mm, report.mean_move_mm, left, report.control_points,
+      report.control_points_before_reduction);
+  result.model = std::move(fitted->model);
+  return result;
+}
+
+// The thesis's way; residual forces are in the potential's unit.
+Result<Fitted> fit_by_edges(const Model& model, const Image<float>& image,
+                            const FitArguments& arguments, const Progress& progress) {
+  DeformModelOptions options;
+  options.method = *deform_method(arguments.solver);
+  options.potential =
+      arguments.potential == "spring" ? PotentialKind::kSpring : PotentialKind::kGravity;
+  options.strength = arguments.strength;
+  options.reach_vox = arguments.reach_vox;
+  options.stiffness = arguments.stiffness;
+  options.edge_percentile = arguments.edge_percentile;
+  options.most_iterations = arguments.most_iterations;
+  options.dark = arguments.dark;
+  auto deformed = deform_model(model, image, options, progress);
+  if (!deformed) return fail(deformed.error());
+  if (auto written =
+          write_residual(arguments.residual, model.name, deformed->mesh, deformed->residual_force);
+      !written) {
+    return fail(written.error());
+  }
+  Fitted result;
+  result.parts = deformed->parts;
+  result.converged = deformed->report.termination == Termination::kAtRest;
+  result.iterations = deformed->report.iterations;
+  result.force_unit = "potential";
+  result.details = {{"method", arguments.solver},
+                    {"potential", arguments.potential},
+                    {"strength", arguments.strength},
+                    {"termination", std::string(to_string(deformed->report.termination))},
+                    {"mesh_nodes", deformed->nodes},
+                    {"edges", deformed->edges},
+                    {"control_points", deformed->model.network.control_points_mm.cols()},
+                    {"coarsening_mm", deformed->coarsening_mm},
+                    {"angle_before_deg", deformed->angle_before_deg},
+                    {"angle_after_deg", deformed->angle_after_deg}};
+  result.summary =
+      fmt::format("{}: {} after {} iterations; {} nodes among {} edges, moved {:.3g} mm",
+                  arguments.solver, to_string(deformed->report.termination), result.iterations,
+                  deformed->nodes, deformed->edges, result.parts.back().moved_mean_mm);
+  result.model = std::move(deformed->model);
+  return result;
+}
+
+Json figures_json(const PartFigures& p, const char* unit) {
+  return {{"name", p.name},
+          {"residual_force", {{"mean", p.residual_mean}, {"max", p.residual_most}, {"unit", unit}}},
+          {"moved_mm", {{"mean", p.moved_mean_mm}, {"max", p.moved_most_mm}}}};
+}
+
+void add_truth(Json& json, const MaskComparison& c) {
+  json["truth_voxels"] = c.truth_voxels;
+  json["missed_voxels"] = c.missed + c.beyond;
+  json["missed_percent"] = c.missed_percent;
+  json["dice"] = c.dice;
+  if (c.surface) {
+    json["assd_mm"] = c.surface->mean_mm;
+    json["hausdorff95_mm"] = c.surface->hausdorff95_mm;
+  }
+}
+
+bool is_model_file(const std::string& path) { return fs::path(path).extension() == ".json"; }
+
+// The start: a native model, or closed surfaces around the pieces of a mask.
+Result<Model> start_of(const std::string& path, const Progress& progress) {
+  if (is_model_file(path)) return read_model(path);
+  const auto file = read_image(path, {}, progress);
+  if (!file) {
+    return fail({ErrorKind::kBadInput, "only a native model or a mask can be fitted", path,
+                 fs::path(path).extension().string(),
+                 "a .json that seed, recover or fit wrote, or an image that is not zero inside"});
+  }
+  return mask_from_image(file->image, path).and_then([&](const Mask& mask) {
+    auto model = closed_model(mask);
+    if (!model && model.error().where.empty()) {
+      Error error = model.error();
+      error.where = path;
+      return Result<Model>(fail(error));
+    }
+    if (model) model->name = fs::path(path).stem().string();
+    return model;
+  });
 }
 
 }  // namespace
@@ -103,12 +225,7 @@ int run_fit(const FitArguments& arguments) {
     return report_error({ErrorKind::kCannotWrite, "residuals cannot be written to this file",
                          arguments.residual, residual_suffix.string(), ".glb or .vtp"});
   }
-  if (fs::path(arguments.model).extension() != ".json") {
-    return report_error({ErrorKind::kBadInput, "only a native model can be fitted", arguments.model,
-                         fs::path(arguments.model).extension().string(),
-                         "a .json that seed, recover or fit wrote"});
-  }
-  const auto model = read_model(arguments.model);
+  const auto model = start_of(arguments.model, console.progress());
   if (!model) return report_error(model.error());
   const auto file = read_image(arguments.image, {}, console.progress());
   if (!file) return report_error(file.error());
@@ -116,10 +233,9 @@ int run_fit(const FitArguments& arguments) {
   if (!image) return report_error(image.error());
   watch.lap("read");
 
-  FitOptions options;
-  options.dark = arguments.dark;
-  options.capture = arguments.capture;
-  const auto fitted = fit_model(*model, *image, options, console.progress());
+  const auto fitted = arguments.solver.empty()
+                          ? fit_walls(*model, *image, arguments, console.progress())
+                          : fit_by_edges(*model, *image, arguments, console.progress());
   if (!fitted) {
     Error error = fitted.error();
     if (error.where == "fit") error.where = arguments.model + " in " + arguments.image;
@@ -134,18 +250,11 @@ int run_fit(const FitArguments& arguments) {
     truth = *compared;
     watch.lap("truth");
   }
-  const auto residual =
-      tell_residual(fitted->model, *image, options, arguments.residual, console.progress());
-  if (!residual) return report_error(residual.error());
-  watch.lap("residual");
   const auto certificate =
       finish_model(fitted->model, paths, arguments.step_schema, console, watch);
   if (!certificate) return report_error(certificate.error());
 
-  const FitReport& report = fitted->report;
-  console.say(fmt::format(
-      "SNR {:.3g}; axes moved {:.3g} mm, walls {:.3g} mm; {:.3g} mm left; {} control points",
-      report.snr, report.mean_axis_move_mm, report.mean_move_mm, *residual, report.control_points));
+  console.say(fitted->summary);
   if (truth) {
     console.say(fmt::format(
         "truth: {:.3g} % missed, Dice {:.4f}, surface distance {:.3g} mm (mean), {:.3g} mm (95 %)",
@@ -156,8 +265,20 @@ int run_fit(const FitArguments& arguments) {
   if (!arguments.residual.empty()) files.push_back(arguments.residual);
   if (arguments.json) {
     Json json = model_json(fitted->model);
-    json["fit"] = fit_json(report, *residual);
-    if (truth) json["truth"] = truth_json(*truth);
+    json["iterations"] = fitted->iterations;
+    json["converged"] = fitted->converged;
+    const Json all = figures_json(fitted->parts.back(), fitted->force_unit);
+    json["residual_force"] = all["residual_force"];
+    json["moved_mm"] = all["moved_mm"];
+    json["parts"] = Json::array();
+    for (std::size_t p = 0; p + 1 < fitted->parts.size(); ++p) {
+      Json part = figures_json(fitted->parts[p], fitted->force_unit);
+      part["iterations"] = fitted->iterations;
+      part["converged"] = fitted->converged_part(fitted->parts[p].name);
+      json["parts"].push_back(part);
+    }
+    json["fit"] = fitted->details;
+    if (truth) add_truth(json, *truth);
     json["seconds"] = seconds_json(watch);
     json["files"] = files;
     json["check"] = to_json(*certificate);

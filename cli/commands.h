@@ -63,13 +63,21 @@ struct RecoverArguments {
 };
 
 struct FitArguments {
-  std::string model;
+  std::string model;  // or a mask, for closed surfaces
   std::string image;
   std::vector<std::string> outputs;
   std::string truth;     // a mask to measure the result by; may be empty
   std::string residual;  // .glb or .vtp with what is left as colours; may be empty
   bool dark = false;
   bool capture = true;
+  // The thesis's way, by edges that pull a mesh; no solver: the default fit.
+  std::string solver;
+  std::string potential = "gravity";
+  double strength = 10.0;
+  double reach_vox = 4.0;
+  std::optional<double> stiffness;
+  double edge_percentile = 97.0;
+  int most_iterations = 2000;
   std::string step_schema = "AP242";
   bool json = false;
 };

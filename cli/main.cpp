@@ -179,7 +179,10 @@ void add_fit(CLI::App& app, CommandLine& line) {
   CLI::App* command =
       app.add_subcommand("fit", "move a model's walls to where an image shows them");
   FitArguments& a = line.fit;
-  command->add_option("MODEL", a.model, "native model (.json)")->required();
+  command
+      ->add_option("MODEL", a.model,
+                   "native model (.json); or a mask, of which each piece becomes a closed surface")
+      ->required();
   command->add_option("IMAGE", a.image, "the image it came from")->required();
   command
       ->add_option(
@@ -192,6 +195,27 @@ void add_fit(CLI::App& app, CommandLine& line) {
   command->add_flag("--dark", a.dark, "vessels are darker than their background");
   command->add_flag("!--no-capture", a.capture,
                     "refine the surfaces as they are; do not move centerlines and radii first");
+  CLI::Option* solver =
+      command
+          ->add_option(
+              "--solver", a.solver,
+              "deform by edges and potentials (the thesis's way) with this solver: sparse, "
+              "euler-svd, euler-dft, euler-dft-phantom, central, central-dft, runge-kutta-1 "
+              "or runge-kutta-4")
+          ->check(CLI::IsMember({"sparse", "euler-svd", "euler-dft", "euler-dft-phantom", "central",
+                                 "central-dft", "runge-kutta-1", "runge-kutta-4"}));
+  command->add_option("--potential", a.potential, "gravity (default) or spring")
+      ->check(CLI::IsMember({"gravity", "spring"}))
+      ->needs(solver);
+  command->add_option("--strength", a.strength, "of the potential (default 10)")->needs(solver);
+  command->add_option("--reach", a.reach_vox, "of the potential, in voxels (default 4)")
+      ->needs(solver);
+  command->add_option("--stiffness", a.stiffness, "of the springs between nodes")->needs(solver);
+  command
+      ->add_option("--edges", a.edge_percentile,
+                   "edges are stronger than so many percent of the voxels (default 97)")
+      ->needs(solver);
+  command->add_option("--iterations", a.most_iterations, "at most (default 2000)")->needs(solver);
   add_schema_option(command, a.step_schema);
   add_json_flag(command, a.json);
   command->callback([&line] { line.verb = [&line] { return run_fit(line.fit); }; });

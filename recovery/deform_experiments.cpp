@@ -12,29 +12,6 @@
 namespace angiospline {
 namespace experiments {
 
-DeformOptions steady(DeformMethod method, const DeformMesh& mesh, PotentialKind kind,
-                     double strength, double reach_vox) {
-  if (method == DeformMethod::kSparse) {
-    DeformOptions o;
-    o.potential.kind = kind;
-    o.potential.strength = strength;
-    o.potential.reach_vox = reach_vox;
-    return o;
-  }
-  DeformOptions o = thesis_options(method);
-  o.potential.kind = kind;
-  o.potential.strength = strength;
-  o.potential.reach_vox = reach_vox;
-  if (has_mass(method)) return o;
-  const ElementSystem system(mesh, 1.0, o.elements);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(system.laplacian()),
-                                                             Eigen::EigenvaluesOnly);
-  const double least = eigen.eigenvalues()[1];  // [0] is the translation's, 0
-  const double steepness = kind == PotentialKind::kGravity ? strength / 2 : strength / reach_vox;
-  o.time_step = std::min(0.4, 1.85 * least / steepness);
-  return o;
-}
-
 std::string listed(const std::vector<double>& values, int digits) {
   std::string text;
   for (const double v : values)

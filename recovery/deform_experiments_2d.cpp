@@ -114,9 +114,9 @@ Result<ReproducedTable> by_method(const std::vector<Setting>& settings, const Re
     ReproducedRow row{kMethods[m].name, {}};
     for (const Setting& s : settings) {
       const DeformMesh start = slice->circle(s.right, Vec3(0.8, -0.5, 0), 6, 12);
-      const auto out =
-          slice->run(s.right, start, steady(kMethods[m].method, start, s.kind, s.strength, kReach),
-                     how, progress);
+      const auto out = slice->run(
+          s.right, start, steady_options(kMethods[m].method, start, s.kind, s.strength, kReach),
+          how, progress);
       if (!out) return fail(out.error());
       std::optional<Outcome> thesis;
       if (m < s.thesis.size()) thesis = s.thesis[m];
@@ -242,11 +242,11 @@ Result<ReproducedTable> starts(const ReproduceOptions& how, const Progress& prog
     row.label = k < positions ? fmt::format("position {:+}/{:+}", s.x, s.y)
                               : fmt::format("size {}", s.radius);
     const DeformOptions dft =
-        steady(DeformMethod::kEulerDft, start, PotentialKind::kGravity, 10, kReach);
+        steady_options(DeformMethod::kEulerDft, start, PotentialKind::kGravity, 10, kReach);
     DeformOptions dragged = dft;
     dragged.elements.drag = 0.5;
     const DeformOptions sparse =
-        steady(DeformMethod::kSparse, start, PotentialKind::kGravity, 10, kReach);
+        steady_options(DeformMethod::kSparse, start, PotentialKind::kGravity, 10, kReach);
     for (const DeformOptions* o :
          std::initializer_list<const DeformOptions*>{&dft, &dragged, &sparse}) {
       const auto out = slice->run(true, start, *o, how, progress);
@@ -295,12 +295,14 @@ Result<ReproducedTable> fineness(const ReproduceOptions& how, const Progress& pr
     const int sides = static_cast<int>(row[0]);
     if (how.quick && sides > 12) break;
     const DeformMesh start = slice->circle(true, Vec3(0.8, -0.5, 0), 6, sides);
-    DeformOptions dft = steady(DeformMethod::kEulerDft, start, PotentialKind::kGravity, 1, kReach);
+    DeformOptions dft =
+        steady_options(DeformMethod::kEulerDft, start, PotentialKind::kGravity, 1, kReach);
     dft.rest_speed = 0.03;  // 1x: everything is slower
     const auto a = slice->run(true, start, dft, how, progress);
     if (!a) return fail(a.error());
     const auto b = slice->run(
-        true, start, steady(DeformMethod::kSparse, start, PotentialKind::kGravity, 10, kReach), how,
+        true, start,
+        steady_options(DeformMethod::kSparse, start, PotentialKind::kGravity, 10, kReach), how,
         progress);
     if (!b) return fail(b.error());
     t.rows.push_back(

@@ -64,7 +64,7 @@ class Volume {
 
   Result<Outcome> run(const DeformMesh& start, DeformMethod method, double reach_vox,
                       const ReproduceOptions& how, const Progress& progress) const {
-    DeformOptions options = steady(method, start, PotentialKind::kGravity, 10, reach_vox);
+    DeformOptions options = steady_options(method, start, PotentialKind::kGravity, 10, reach_vox);
     options.most_iterations = how.quick ? 20 : 2000;
     const auto fit = deform(start, edges_, 1.0, options, progress);
     if (!fit) return fail(fit.error());

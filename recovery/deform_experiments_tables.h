@@ -21,12 +21,6 @@ Result<ReproducedTable> small_vessel(const ReproduceOptions&, const Progress&);
 Result<ReproducedTable> bifurcation(const ReproduceOptions&, const Progress&);
 Result<ReproducedTable> smoothing(const ReproduceOptions&, const Progress&);  // 7.2.4
 
-// thesis_options, with the time step an explicit step bears: massless methods divide by the
-// damping, whose least eigenvalue l (of those not 0) makes forces of steepness s move a mesh by s /
-// l a unit of time; a step beyond 2 l / s overshoots. O(nodes^3).
-DeformOptions steady(DeformMethod method, const DeformMesh& mesh, PotentialKind kind,
-                     double strength, double reach_vox);
-
 // "12, 15, 18"
 std::string listed(const std::vector<double>& values, int digits = 0);
 

@@ -1,8 +1,11 @@
 #include "recovery/deform_solver.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/SparseCholesky>
 #include <fmt/format.h>
 
 namespace angiospline {
@@ -211,6 +214,47 @@ std::optional<DeformMethod> deform_method(std::string_view name) {
 bool has_mass(DeformMethod method) {
   return method == DeformMethod::kCentral || method == DeformMethod::kCentralDft ||
          method == DeformMethod::kRungeKutta1 || method == DeformMethod::kRungeKutta4;
+}
+
+namespace {
+
+// The least eigenvalue of the damping that is not that of a translation.
+double least_eigenvalue(const Eigen::SparseMatrix<double>& L) {
+  constexpr Eigen::Index kDense = 1500;
+  if (L.rows() <= kDense) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(L),
+                                                               Eigen::EigenvaluesOnly);
+    return eigen.eigenvalues()[1];  // [0] is the translation's, 0
+  }
+  constexpr double kShift = 1e-9;
+  Eigen::SparseMatrix<double> shifted = L;
+  shifted.diagonal().array() += kShift;
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> inverse(shifted);
+  Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(L.rows(), -1, 1);
+  for (int k = 0; k < 60; ++k) {
+    x.array() -= x.mean();
+    x = inverse.solve(x.normalized()).eval();
+  }
+  x.array() -= x.mean();
+  x.normalize();
+  return x.dot(L * x);
+}
+
+}  // namespace
+
+DeformOptions steady_options(DeformMethod method, const DeformMesh& mesh, PotentialKind kind,
+                             double strength, double reach_vox) {
+  DeformOptions o = method == DeformMethod::kSparse ? DeformOptions() : thesis_options(method);
+  o.potential.kind = kind;
+  o.potential.strength = strength;
+  o.potential.reach_vox = reach_vox;
+  // Other methods bear their step; what cannot be used is for deform() to name.
+  if (method == DeformMethod::kSparse || has_mass(method)) return o;
+  if (!(strength > 0) || !(reach_vox > 0) || mesh.node_count() < 3) return o;
+  const ElementSystem system(mesh, 1.0, o.elements);
+  const double steepness = kind == PotentialKind::kGravity ? strength / 2 : strength / reach_vox;
+  o.time_step = std::min(0.4, 1.85 * least_eigenvalue(system.laplacian()) / steepness);
+  return o;
 }
 
 std::string_view to_string(Termination termination) {

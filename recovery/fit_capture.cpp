@@ -22,6 +22,8 @@ constexpr double kStationVox = 1.5;    // ... and at least in voxels
 constexpr int kFewestStations = 4;
 constexpr double kGoodEvidence = 0.6;  // of the contrast: the sections lie on the vessel
 constexpr double kNoEvidence = 0.3;    // there is none
+constexpr std::array<double, 5> kReaches{1.0, 1.5, 2.2, 3.3, 5.0};
+constexpr double kEnoughContrast = 0.7;  // of the largest at any reach
 constexpr int kWideRounds = 6;
 constexpr int kNarrowRounds = 4;
 constexpr int kNeighbours = 4;   // sections on either side that moments are averaged over
@@ -131,6 +133,7 @@ class Capture {
       }
     }
     result.tree = moved_tree(result.mean_move_mm);
+    result.rounds = kNarrowRounds + (result.recaptured.empty() ? 0 : kWideRounds);
     return result;
   }
 
@@ -230,7 +233,7 @@ class Capture {
     std::vector<double> all;
     for (const Branch& branch : branches_) all.push_back(branch.evidence);
     lost = lost || median(all) < kGoodEvidence;
-    if (lost) two_levels();
+    if (lost) look_around();
     for (Branch& branch : branches_) {
       fill_levels(branch);
       set_evidence(branch);
@@ -245,21 +248,37 @@ class Capture {
     }
   }
 
-  // Two means of grey in wide discs around all stations, each averaged along its branch: for a tree
-  // that lies beside its vessels.
-  void two_levels() {
+  // For a tree that lies beside its vessels, or wholly inside them: two means of grey in discs
+  // around all stations, the smallest discs in which they differ about as much as in any.
+  void look_around() {
+    std::vector<WallLevels> found;
+    double most = 0;
+    for (const double reach : kReaches) {
+      reach_ = reach;
+      found.push_back(two_levels());
+      most = std::max(most, found.back().contrast());
+    }
+    std::size_t k = 0;
+    while (found[k].contrast() < kEnoughContrast * most) ++k;
+    reach_ = kReaches[k];
+    common_ = found[k];
+  }
+
+  // Means of the brighter and the darker part of all discs; no contrast if either has less than
+  // 2 % of them.
+  WallLevels two_levels() const {
     std::vector<double> greys;
     for (const Branch& branch : branches_) {
       for (std::size_t k = 0; k < branch.stations.size(); ++k) {
-        for (const Disc::Cell& cell : disc_at(branch, k).cells) greys.push_back(cell.grey);
+        for (const Disc::Cell& cell : disc_at(branch, k, reach_).cells) greys.push_back(cell.grey);
       }
     }
-    if (greys.empty()) return;
+    if (greys.empty()) return {0.0, 0.0};
     std::sort(greys.begin(), greys.end());
+    std::vector<double> sums{0.0};
+    for (const double grey : greys) sums.push_back(sums.back() + grey);
     const auto mean = [&](std::size_t from, std::size_t to) {
-      double sum = 0;
-      for (std::size_t i = from; i < to; ++i) sum += greys[i];
-      return to > from ? sum / static_cast<double>(to - from)
+      return to > from ? (sums[to] - sums[from]) / static_cast<double>(to - from)
                        : greys[std::min(from, greys.size() - 1)];
     };
     std::size_t cut = greys.size() / 2;
@@ -268,7 +287,9 @@ class Capture {
       cut = static_cast<std::size_t>(std::lower_bound(greys.begin(), greys.end(), threshold) -
                                      greys.begin());
     }
-    common_ = {mean(cut, greys.size()), mean(0, cut)};
+    const std::size_t fewest = greys.size() / 50;
+    if (cut < fewest || cut > greys.size() - fewest) return {0.0, 0.0};
+    return {mean(cut, greys.size()), mean(0, cut)};
   }
 
   // Grey around a station, averaged over its neighbours.
@@ -281,17 +302,19 @@ class Capture {
     double cell_area = 1.0;
     double radius = 0.0;
   };
-  Disc disc_at(const Branch& branch, std::size_t k) const {
+  // `reach` widens it, in multiples of what the branch started with.
+  Disc disc_at(const Branch& branch, std::size_t k, double reach) const {
     const Station& s = branch.stations[k];
     Disc disc;
-    disc.radius = 1.5 * s.radius + 3 * voxel_;
+    disc.radius =
+        std::max(1.5 * s.radius + 3 * voxel_, reach * (1.5 * s.start_radius + 3 * voxel_));
     const double step = std::max(voxel_, disc.radius / 10);
     disc.cell_area = step * step;
-    const int reach = static_cast<int>(disc.radius / step);
+    const int cells = static_cast<int>(disc.radius / step);
     const std::size_t from = k > kNeighbours ? k - kNeighbours : 0;
     const std::size_t to = std::min(branch.stations.size() - 1, k + kNeighbours);
-    for (int i = -reach; i <= reach; ++i) {
-      for (int j = -reach; j <= reach; ++j) {
+    for (int i = -cells; i <= cells; ++i) {
+      for (int j = -cells; j <= cells; ++j) {
         const Vec2 place = step * Vec2(i, j);
         if (place.norm() > disc.radius) continue;
         double sum = 0;
@@ -317,7 +340,7 @@ class Capture {
       const Branch now = branch;
       for (std::size_t k = 0; k < now.stations.size(); ++k) {
         if (!now.stations[k].clear) continue;
-        const Disc disc = disc_at(now, k);
+        const Disc disc = disc_at(now, k, 2 * round < kWideRounds ? reach_ : 1.0);
         double area = 0;
         Vec2 moment = Vec2::Zero();
         for (const Disc::Cell& cell : disc.cells) {
@@ -529,6 +552,7 @@ class Capture {
   std::vector<Branch> branches_;
   std::vector<std::vector<int>> at_node_;
   WallLevels common_;
+  double reach_ = 1.0;  // of the discs that a lost tree is led by, in multiples of their size
 };
 
 }  // namespace

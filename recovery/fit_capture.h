@@ -13,6 +13,7 @@ namespace angiospline {
 
 struct CapturedTree {
   CenterlineTree tree;                  // names and topology as given
+  int rounds = 0;                       // of measurement
   double mean_move_mm = 0.0;            // of the axes, over all places that were measured
   std::vector<std::string> left_alone;  // branches near which no wall was found: as given
   std::vector<std::string> recaptured;  // branches that had to be found again from farther off

@@ -1,18 +1,22 @@
 #include "recovery/fit_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
 
+#include "recovery/closed_surface.h"
 #include "recovery/fit_capture.h"
 #include "recovery/fit_rings.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kEvidence = 0.25;     // of the contrast across a region's wall: less is no wall
+constexpr double kEvidence = 0.25;  // of the contrast across a region's wall: less is no wall
+constexpr std::array<double, 2> kCaptureWindows{0.4, 0.2};  // of a closed surface, in its radii
+constexpr int kClosedRounds = 2;
 constexpr double kLeastCovered = 0.5;  // of the nodes: fewer in the image, and the frames differ
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -47,15 +51,35 @@ class Fitter {
     FittedModel fitted{std::move(*seeded), {}};
     fitted.report.mean_axis_move_mm = captured->mean_move_mm;
     fitted.report.recaptured = captured->recaptured;
+    fitted.report.iterations = captured->rounds;
     for (const std::string& name : captured->left_alone) {
       fitted.report.without_edge.push_back("wall_" + name);
     }
-    return refined(std::move(fitted));
+    return refined(std::move(fitted), options_.rounds);
   }
 
   Result<FittedModel> run(const Model& model) {
     if (const auto apart = check_frames(model.network.control_points_mm)) return fail(*apart);
-    return refined({model, {}});
+    FittedModel fitted{model, {}};
+    if (!options_.capture) return refined(std::move(fitted), options_.rounds);
+    double radius = 0;
+    const std::vector<std::vector<int>> closed = closed_patches(model.network);
+    for (std::size_t r = 0; r < closed.size(); ++r) {
+      if (!closed[r].empty()) radius = std::max(radius, model.network.regions[r].radius_mm);
+    }
+    // A closed surface has no centerline to be led by: it is captured by its own wall, in windows
+    // that become narrower.
+    if (radius == 0) return refined(std::move(fitted), options_.rounds);
+    const double least = options_.displacement.half_windows_vox.front();
+    for (const double share : kCaptureWindows) {
+      DisplacementOptions wide = options_.displacement;
+      const double window = std::max(least, share * radius / field_.voxel_mm());
+      wide.half_windows_vox = {window, std::max(least, window / 2)};
+      if (auto moved = refine(fitted.model.network, fitted.report, wide); !moved) {
+        return fail(moved.error());
+      }
+    }
+    return refined(std::move(fitted), std::max(options_.rounds, kClosedRounds));
   }
 
  private:
@@ -72,27 +96,16 @@ class Fitter {
   }
 
   std::optional<Error> check_frames(const Points3& p) const {
-    Eigen::Index covered = 0;
-    for (Eigen::Index c = 0; c < p.cols(); ++c) covered += field_.covers(p.col(c)) ? 1 : 0;
-    const double share = static_cast<double>(covered) / static_cast<double>(p.cols());
-    if (share >= kLeastCovered) return {};
-    const ImageGrid& grid = field_.image().grid;
-    const Vec3 center = p.rowwise().mean();
-    const Vec3 middle = grid.world_mm(
-        Vec3((grid.size[0] - 1) / 2.0, (grid.size[1] - 1) / 2.0, (grid.size[2] - 1) / 2.0));
-    return Error{
-        ErrorKind::kBadInput, "the model lies outside the image", "fit",
-        fmt::format("{:.0f} % of its points are inside; the model is centred at "
-                    "({:.4g}, {:.4g}, {:.4g}), the image at ({:.4g}, {:.4g}, {:.4g})",
-                    100 * share, center(0), center(1), center(2), middle(0), middle(1), middle(2)),
-        "both in one frame (LPS, mm), with half of the model inside the image"};
+    return frames_apart(p, field_.image().grid);
   }
 
-  Result<FittedModel> refined(FittedModel fitted) {
+  Result<FittedModel> refined(FittedModel fitted, int rounds) {
     SurfaceNetwork& network = fitted.model.network;
     network = with_finer_bodies(network, options_.body_spans);
-    for (int round = 0; round < options_.rounds; ++round) {
-      if (auto moved = refine(network, fitted.report); !moved) return fail(moved.error());
+    for (int round = 0; round < rounds; ++round) {
+      if (auto moved = refine(network, fitted.report, options_.displacement); !moved) {
+        return fail(moved.error());
+      }
     }
     for (const std::string& name : fitted.report.without_edge) {
       fitted.model.warnings.push_back(
@@ -102,23 +115,39 @@ class Fitter {
       fitted.model.warnings.push_back(
           fmt::format("{} was not refined to the image: {}", held.name, held.why));
     }
+    fitted.report.control_points_before_reduction =
+        static_cast<int>(network.control_points_mm.cols());
+    reduce(network, fitted.report);
     fitted.report.control_points = static_cast<int>(network.control_points_mm.cols());
     return fitted;
   }
 
-  Result<void> refine(SurfaceNetwork& network, FitReport& report) {
+  // The standard error of a wall with so many degrees of freedom, from noise alone, is
+  // sqrt(window voxels / area) of a voxel over SNR (docs/fit.md).
+  void reduce(SurfaceNetwork& network, FitReport& report) const {
+    const double voxel = field_.voxel_mm();
+    const double window = 2 * options_.displacement.half_windows_vox.back();
+    const double freedom = std::max(1.0, report.degrees_of_freedom);
+    const double error =
+        voxel / report.snr * std::sqrt(window * freedom * voxel * voxel / report.area_mm2);
+    report.reduction_mm = options_.reduction * error;
+    if (report.reduction_mm > 0) network = with_fewer_knots(network, report.reduction_mm);
+  }
+
+  Result<void> refine(SurfaceNetwork& network, FitReport& report,
+                      const DisplacementOptions& options) {
     FitMeshOptions spacing;
     spacing.voxel_mm = field_.voxel_mm();
     auto mesh = make_fit_mesh(network, spacing, progress_);
     if (!mesh) return fail(mesh.error());
     MeshSmoother smoother(*mesh);
-    Displacement displacement =
-        wall_displacement(field_, *mesh, smoother, options_.displacement, progress_);
+    Displacement displacement = wall_displacement(field_, *mesh, smoother, options, progress_);
     if (progress_.should_stop()) return fail(cancelled("wall"));
     report.contrast = displacement.greys.contrast;
     report.noise = displacement.greys.noise;
     report.snr = displacement.greys.snr();
     report.nodes = mesh->size();
+    report.iterations += static_cast<int>(options.half_windows_vox.size());
     report.degrees_of_freedom = displacement.degrees_of_freedom;
     report.wave_factor = displacement.wave_factor;
     if (!(report.contrast > 0)) {
@@ -142,6 +171,7 @@ class Fitter {
     network = std::move(moved->network);
     report.held = std::move(moved->held);
     const Eigen::VectorXd& mass = smoother.mass_mm2();
+    report.area_mm2 = mass.sum();
     report.mean_move_mm = mass.dot(displacement.normal_mm.cwiseAbs()) / mass.sum();
     return {};
   }
@@ -153,6 +183,29 @@ class Fitter {
 };
 
 }  // namespace
+
+std::optional<Error> frames_apart(const Points3& points_mm, const ImageGrid& grid) {
+  Eigen::Index covered = 0;
+  for (Eigen::Index c = 0; c < points_mm.cols(); ++c) {
+    const Vec3 x = grid.index_vox(points_mm.col(c));
+    bool inside = true;
+    for (int i = 0; i < 3; ++i) {
+      inside = inside && x(i) >= -0.5 && x(i) <= grid.size[at(i)] - 0.5;
+    }
+    covered += inside ? 1 : 0;
+  }
+  const double share = static_cast<double>(covered) / static_cast<double>(points_mm.cols());
+  if (share >= kLeastCovered) return {};
+  const Vec3 center = points_mm.rowwise().mean();
+  const Vec3 middle = grid.world_mm(
+      Vec3((grid.size[0] - 1) / 2.0, (grid.size[1] - 1) / 2.0, (grid.size[2] - 1) / 2.0));
+  return Error{
+      ErrorKind::kBadInput, "the model lies outside the image", "fit",
+      fmt::format("{:.0f} % of its points are inside; the model is centred at "
+                  "({:.4g}, {:.4g}, {:.4g}), the image at ({:.4g}, {:.4g}, {:.4g})",
+                  100 * share, center(0), center(1), center(2), middle(0), middle(1), middle(2)),
+      "both in one frame (LPS, mm), with half of the model inside the image"};
+}
 
 Result<Image<float>> grey_image(const AnyImage& image, const std::string& file) {
   const ImageGrid& grid = grid_of(image);

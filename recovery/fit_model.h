@@ -1,6 +1,7 @@
 // A model fitted to the image it came from: every wall moved to where the grey values put it.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,10 @@ struct FitOptions {
   bool capture = true;      // move the centerlines and radii to the image and seed anew, first
   bool dark = false;        // vessels are darker than their background
   int rounds = 1;           // of free-form refinement of the surface
-  double body_spans = 1.0;  // length of a body's spans, in radii
+  double body_spans = 1.0;  // length of a body's spans, in radii, while it is fitted
+  // What data reduction may move a body by afterwards, in standard errors of the fitted wall; 0: no
+  // reduction. A mean error e so becomes at most about e (1 + reduction^2 / 6).
+  double reduction = 0.6;
   DisplacementOptions displacement;
   SeedOptions seed;
 };
@@ -27,13 +31,16 @@ struct FitReport {
   double contrast = 0.0;  // grey of the vessel above its background
   double noise = 0.0;     // standard deviation of a voxel's grey
   double snr = 0.0;       // contrast over noise, at most 20
+  int iterations = 0;     // times that the wall was measured
   int nodes = 0;          // of the finite-element mesh
+  double area_mm2 = 0.0;  // of the wall
   int control_points = 0;
+  int control_points_before_reduction = 0;
+  double reduction_mm = 0.0;        // its tolerance; 0: none
   double wave_factor = 1.0;         // smoothing that the data chose (recovery/fit_displacement.h)
   double degrees_of_freedom = 0.0;  // of the refinement
   double mean_axis_move_mm = 0.0;   // of the centerlines in the capture
   double mean_move_mm = 0.0;        // of the surface, over its area, in the refinement
-  double mean_residual_mm = 0.0;    // what the image still asks for, smoothed as the fit is
   std::vector<std::string> without_edge;  // regions near which the image shows no wall: as seeded
   std::vector<std::string> recaptured;  // branches that lay beside their vessel and were led there
   std::vector<HeldRegion> held;         // regions that would have folded: as seeded
@@ -47,6 +54,9 @@ struct FittedModel {
 // The voxels as floats. Errors, naming `file`: voxels that are NaN or infinite, an image without
 // any contrast, fewer than 4 voxels along an axis.
 Result<Image<float>> grey_image(const AnyImage& image, const std::string& file);
+
+// What is wrong if fewer than half of the points lie in the image: their frames differ.
+std::optional<Error> frames_apart(const Points3& points_mm, const ImageGrid& grid);
 
 // Fits the whole network, bodies and junctions together (docs/fit.md). With `capture` the model is
 // seeded anew from its tree, as fit_tree does; otherwise its surfaces are refined as they are. Open

@@ -6,11 +6,13 @@
 #include <map>
 
 #include <Eigen/Dense>
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "kernel/basis.h"
 #include "kernel/curvature.h"
 #include "modeling/penalised_spline.h"
+#include "recovery/closed_surface.h"
 #include "recovery/fit_junction.h"
 #include "recovery/fit_rings.h"
 
@@ -92,6 +94,7 @@ class Mover {
     const std::map<int, Vec3> openings = moved_openings();
     move_junctions(openings, result, progress);
     if (progress.should_stop()) return fail(cancelled("junctions"));
+    move_closed_regions(result, progress);
     move_end_rows(pool);
     apply_dependencies(result.network);
     move_bodies(result, progress);
@@ -179,41 +182,65 @@ class Mover {
     }
     std::vector<int> regions;
     for (const auto& [region, of_junction] : junctions) regions.push_back(region);
-    std::vector<MovedJunction> moved(regions.size());
+    std::vector<MovedPatches> moved(regions.size());
     std::atomic<std::size_t> done{0};
     tbb::parallel_for(std::size_t{0}, regions.size(), [&](std::size_t k) {
       if (progress.should_stop()) return;
       const std::vector<StripRing>& of_junction = junctions.at(regions[k]);
-      moved[k] = move_junction(old_, of_junction, openings, samples_on(of_junction));
+      std::vector<int> patches;
+      for (const StripRing& ring : of_junction) {
+        patches.insert(patches.end(), ring.patches.begin(), ring.patches.end());
+      }
+      moved[k] = move_junction(old_, of_junction, openings, samples_on(patches));
       progress.at("junctions", static_cast<double>(++done) / static_cast<double>(regions.size()));
     });
-    for (std::size_t k = 0; k < regions.size(); ++k) {
-      if (moved[k].failure.empty()) {
-        for (const auto& [column, point] : moved[k].points) {
-          result.network.control_points_mm.col(column) = point;
-        }
-      } else {
-        result.held.push_back({old_.regions[at(regions[k])].name, moved[k].failure});
-      }
+    for (std::size_t k = 0; k < regions.size(); ++k) take(moved[k], regions[k], result);
+  }
+
+  void move_closed_regions(MovedNetwork& result, const Progress& progress) const {
+    const std::vector<std::vector<int>> closed = closed_patches(old_);
+    std::vector<MovedPatches> moved(closed.size());
+    tbb::parallel_for(std::size_t{0}, closed.size(), [&](std::size_t r) {
+      if (closed[r].empty() || progress.should_stop()) return;
+      moved[r] = move_closed(old_, closed[r], old_.regions[r].radius_mm, samples_on(closed[r]));
+    });
+    for (std::size_t r = 0; r < closed.size(); ++r) {
+      if (!closed[r].empty()) take(moved[r], static_cast<int>(r), result);
     }
   }
 
-  std::vector<JunctionSample> samples_on(const std::vector<StripRing>& rings) const {
-    std::vector<JunctionSample> samples;
-    for (const StripRing& ring : rings) {
-      for (const int patch : ring.patches) {
-        const std::vector<int>& nodes = nodes_of_[at(patch)];
-        double area = 0;
-        for (const int node : nodes) area += mass_(node);
-        for (const int node : nodes) {
-          JunctionSample s;
-          s.patch = patch;
-          s.uv = mesh_.origins[at(node)].uv;
-          s.target_mm = mesh_.nodes[at(node)].point_mm + move_of(node);
-          s.normal = normals_.col(node);
-          s.weight = mass_(node) / area;
-          samples.push_back(s);
-        }
+  void take(const MovedPatches& moved, int region, MovedNetwork& result) const {
+    if (moved.share > 0) {
+      for (const auto& [column, point] : moved.points) {
+        result.network.control_points_mm.col(column) = point;
+      }
+    }
+    if (moved.failure.empty()) return;
+    const std::string& name = old_.regions[at(region)].name;
+    if (moved.share > 0) {
+      result.held.push_back(
+          {name, fmt::format("beyond {:.0f} % of the way: {}", 100 * moved.share, moved.failure)});
+    } else {
+      result.held.push_back({name, moved.failure});
+    }
+  }
+
+  std::vector<PatchSample> samples_on(const std::vector<int>& patches) const {
+    std::vector<PatchSample> samples;
+    for (const int patch : patches) {
+      const std::vector<int>& nodes = nodes_of_[at(patch)];
+      double area = 0;
+      for (const int node : nodes) area += mass_(node);
+      for (const int node : nodes) {
+        PatchSample s;
+        s.patch = patch;
+        s.uv = mesh_.origins[at(node)].uv;
+        s.point_mm = mesh_.nodes[at(node)].point_mm;
+        s.normal = mesh_.nodes[at(node)].normal;
+        s.move_mm = move_of(node);
+        s.moved_normal = normals_.col(node);
+        s.weight = mass_(node) / area;
+        samples.push_back(s);
       }
     }
     return samples;

@@ -8,7 +8,7 @@
 
 namespace angiospline {
 
-// A part of the wall that stayed where it was, and why.
+// A part of the wall that stayed where it was, or went a part of its way, and why.
 struct HeldRegion {
   std::string name;
   std::string why;
@@ -23,8 +23,9 @@ struct MovedNetwork {
 // after: patches share their columns, neighbours their tangent planes, openings and rims their
 // planes.
 //   1. Each opening's circle becomes the ring nearest to the displacements, in its plane.
-//   2. Each junction is moved under its tangent plane equations (recovery/fit_junction.h); one that
-//      fails a gate stays with its openings, and is named.
+//   2. Each junction and each closed surface is moved under its tangent plane equations
+//      (recovery/fit_junction.h); one that fails a gate goes as far as it can, with its openings,
+//      and is named.
 //   3. Each body is fitted between the rows so given; at an opening the row next to it keeps its
 //      distance from it, at a rim the end row stays in its plane. A body that would fold keeps its
 //      shape but for its ends, and is named.

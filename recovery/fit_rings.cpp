@@ -2,13 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
+#include <tbb/parallel_for.h>
+
+#include "base/contract.h"
+#include "kernel/reduce_engine.h"
 #include "kernel/refinement.h"
 
 namespace angiospline {
 namespace {
 
+constexpr int kHeld = 2;      // value and first derivative at the ends of a body
 constexpr int kPerPatch = 5;  // control points of a quintic Bezier patch around the ring
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -167,7 +173,76 @@ void compact(SurfaceNetwork& network) {
   network.control_points_mm = std::move(kept);
 }
 
+// Gives the ring's patches these knots and rows of columns.
+void set_rows(SurfaceNetwork& network, const StripRing& ring, const KnotVector& u,
+              const Eigen::MatrixXi& columns) {
+  for (std::size_t k = 0; k < ring.patches.size(); ++k) {
+    Patch& patch = network.patches[at(ring.patches[k])];
+    patch.u = u;
+    patch.control.clear();
+    for (Eigen::Index i = 0; i < columns.rows(); ++i) {
+      for (int j = 0; j <= kPerPatch; ++j) {
+        patch.control.push_back(columns(i, (kPerPatch * static_cast<int>(k) + j) % ring.points()));
+      }
+    }
+  }
+}
+
 }  // namespace
+
+SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_mm) {
+  EXPECTS(tolerance_mm > 0);
+  SurfaceNetwork fewer = network;
+  std::vector<StripRing> rings;
+  for (StripRing& ring : strip_rings(network)) {
+    const bool body = network.regions[at(ring.region)].kind == RegionKind::kBody;
+    if (body && ring.rows() > kPerPatch + 1) rings.push_back(std::move(ring));
+  }
+  std::vector<std::optional<DirectionResult>> reduced(rings.size());
+  tbb::parallel_for(std::size_t{0}, rings.size(), [&](std::size_t r) {
+    const StripRing& ring = rings[r];
+    const int n = ring.points();
+    Points3 rows(3, static_cast<Eigen::Index>(ring.rows()) * n);
+    for (int i = 0; i < ring.rows(); ++i) {
+      for (int c = 0; c < n; ++c) {
+        rows.col(i * n + c) = network.control_points_mm.col(ring.columns(i, c));
+      }
+    }
+    const std::vector<Knot> kept;
+    reduced[r] = reduce_direction({.knots = ring.u,
+                                   .points = rows.data(),
+                                   .stride = 3 * n,
+                                   .group = 3,
+                                   .tolerance = tolerance_mm,
+                                   .held_first = kHeld,
+                                   .held_last = kHeld,
+                                   .kept = kept,
+                                   .polish = 0});
+  });
+  std::vector<Vec3> pool;
+  for (Eigen::Index c = 0; c < network.control_points_mm.cols(); ++c) {
+    pool.push_back(network.control_points_mm.col(c));
+  }
+  for (std::size_t r = 0; r < rings.size(); ++r) {
+    const StripRing& ring = rings[r];
+    const int n = ring.points(), rows = reduced[r]->knots.control_point_count();
+    if (rows >= ring.rows()) continue;
+    Eigen::MatrixXi columns(rows, n);
+    columns.row(0) = ring.columns.row(0);
+    columns.row(rows - 1) = ring.columns.row(ring.rows() - 1);
+    for (int i = 1; i + 1 < rows; ++i) {
+      for (int c = 0; c < n; ++c) {
+        columns(i, c) = static_cast<int>(pool.size());
+        pool.emplace_back(reduced[r]->points.data() + 3 * (i * n + c));
+      }
+    }
+    set_rows(fewer, ring, reduced[r]->knots, columns);
+  }
+  fewer.control_points_mm =
+      Eigen::Map<const Points3>(pool.data()->data(), 3, static_cast<Eigen::Index>(pool.size()));
+  compact(fewer);
+  return fewer;
+}
 
 SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii) {
   SurfaceNetwork finer = network;
@@ -194,17 +269,7 @@ SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii) {
         }
       }
     }
-    for (std::size_t k = 0; k < ring.patches.size(); ++k) {
-      Patch& patch = finer.patches[at(ring.patches[k])];
-      patch.u = u;
-      patch.control.clear();
-      for (int i = 0; i < rows; ++i) {
-        for (int j = 0; j <= kPerPatch; ++j) {
-          patch.control.push_back(
-              columns(i, (kPerPatch * static_cast<int>(k) + j) % ring.points()));
-        }
-      }
-    }
+    set_rows(finer, ring, u, columns);
   }
   finer.control_points_mm =
       Eigen::Map<const Points3>(pool.data()->data(), 3, static_cast<Eigen::Index>(pool.size()));

@@ -1,6 +1,7 @@
 #include "recovery/phantom.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -79,24 +80,11 @@ Scene cylinder() {
 
 Scene potato() {
   Scene scene{Vec3::Constant(64), {}, {}, "star-shaped solid with five bulges"};
-  const Vec3 centre = Vec3::Constant(31.5);
-  struct Bulge {
-    Vec3 direction;
-    double height_mm, sharpness;
-  };
-  const std::vector<Bulge> bulges = {{Vec3(1, 0.2, 0.5).normalized(), 4.0, 6},
-                                     {Vec3(-0.8, 0.7, -0.3).normalized(), 3.5, 8},
-                                     {Vec3(0.1, -1, 0.3).normalized(), 3.0, 7},
-                                     {Vec3(0.2, 0.3, 1).normalized(), 4.5, 5},
-                                     {Vec3(-0.3, -0.2, -1).normalized(), 4.0, 5}};
-  const auto inside = [=](const Vec3& p) {
+  const Vec3 centre = potato_center_mm();
+  const auto inside = [centre](const Vec3& p) {
     const Vec3 d = p - centre;
     const double r = d.norm();
-    if (r == 0) return -13.0;
-    double radius = 13.0;
-    for (const Bulge& b : bulges)
-      radius += b.height_mm * std::exp(b.sharpness * (b.direction.dot(d) / r - 1));
-    return r - radius;
+    return r == 0 ? -13.0 : r - potato_radius_mm(d / r);
   };
   // The slope of r - R(direction) is at most sqrt(1 + (R'/r)^2), below 2 wherever it is near zero.
   scene.shapes.push_back({inside, centre.array() - 20, centre.array() + 20, 2.0});
@@ -244,6 +232,25 @@ void move_to_world(CenterlineTree& tree, const ImageGrid& grid) {
 Vec3 Ring::at(double angle_rad) const {
   return centre_mm +
          ring_radius_mm * (std::cos(angle_rad) * start + std::sin(angle_rad) * axis.cross(start));
+}
+
+Vec3 potato_center_mm() { return Vec3::Constant(31.5); }
+
+double potato_radius_mm(const Vec3& direction) {
+  struct Bulge {
+    Vec3 direction;
+    double height_mm, sharpness;
+  };
+  static const std::array<Bulge, 5> kBulges = {{{Vec3(1, 0.2, 0.5).normalized(), 4.0, 6},
+                                                {Vec3(-0.8, 0.7, -0.3).normalized(), 3.5, 8},
+                                                {Vec3(0.1, -1, 0.3).normalized(), 3.0, 7},
+                                                {Vec3(0.2, 0.3, 1).normalized(), 4.5, 5},
+                                                {Vec3(-0.3, -0.2, -1).normalized(), 4.0, 5}}};
+  double radius = 13.0;
+  for (const Bulge& b : kBulges) {
+    radius += b.height_mm * std::exp(b.sharpness * (b.direction.dot(direction) - 1));
+  }
+  return radius;
 }
 
 std::vector<Ring> phantom_rings() {

@@ -65,6 +65,10 @@ Result<Phantom> make_phantom(PhantomKind kind, const PhantomOptions& options = {
 // "rings", "cylinder", "potato", "bifurcation", "bent-vessel", "tree".
 std::optional<PhantomKind> phantom_kind(const std::string& name);
 
+// The potato, in the grid's own frame: its centre, and its radius in a direction (a unit vector).
+Vec3 potato_center_mm();
+double potato_radius_mm(const Vec3& direction);
+
 // The axes of the rings and the middle of each, in the grid's own frame; for projections.
 struct Ring {
   Vec3 centre_mm, axis, start;  // angle 0 lies along `start`

@@ -42,13 +42,65 @@ TEST_F(Fit, WritesTheModelItsResidualAndItsDistanceFromTheTruth) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto json = nlohmann::json::parse(run.out);
   EXPECT_NEAR(json["fit"]["snr"], 8, 1);
-  EXPECT_LT(json["fit"]["mean_residual_mm"], 0.1);
-  EXPECT_LT(json["truth"]["missed_percent"], 10);  // 6.5 are its round ends, cut flat here
-  EXPECT_GT(json["truth"]["dice"], 0.95);
+  EXPECT_TRUE(json["converged"]);
+  EXPECT_GT(json["iterations"], 0);
+  EXPECT_LT(json["residual_force"]["mean"], 0.1);
+  EXPECT_GE(json["residual_force"]["max"], json["residual_force"]["mean"]);
+  EXPECT_GE(json["moved_mm"]["max"], json["moved_mm"]["mean"]);
+  ASSERT_EQ(json["parts"].size(), 1U);
+  for (const char* key : {"name", "iterations", "converged", "residual_force", "moved_mm"}) {
+    EXPECT_TRUE(json["parts"][0].contains(key)) << key;
+  }
+  EXPECT_GT(json["truth_voxels"], 500);
+  EXPECT_NEAR(json["missed_percent"],
+              100.0 * json["missed_voxels"].get<double>() / json["truth_voxels"].get<double>(),
+              1e-9);
+  EXPECT_LT(json["missed_percent"], 10);  // 6.5 are its round ends, cut flat here
+  EXPECT_GT(json["dice"], 0.95);
+  EXPECT_LT(json["assd_mm"], 0.3);
+  EXPECT_GE(json["hausdorff95_mm"], json["assd_mm"]);
   EXPECT_LT(json["check"]["max_normal_angle_deg"], 0.01);
   EXPECT_TRUE(json["check"]["valid"]);
   EXPECT_TRUE(read_model(folder_ / "out.json"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "residual.glb"));
+}
+
+TEST_F(Fit, TakesEachSolverAndPotentialByName) {
+  int done = 0;
+  for (const char* solver : {"sparse", "euler-svd", "euler-dft", "euler-dft-phantom", "central",
+                             "central-dft", "runge-kutta-1", "runge-kutta-4"}) {
+    const char* potential = done % 2 == 0 ? "gravity" : "spring";
+    const ProgramRun run = fit({"--solver", solver, "--potential", potential, "--iterations", "40",
+                                "--residual", folder_ / "force.vtp", "--json"});
+    ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 1) << solver << ": " << run.err;
+    const auto json = nlohmann::json::parse(run.out);
+    EXPECT_EQ(json["fit"]["method"], solver);
+    EXPECT_EQ(json["fit"]["potential"], potential);
+    EXPECT_EQ(json["residual_force"]["unit"], "potential");
+    EXPECT_TRUE(json["check"]["closed"]);
+    ++done;
+  }
+  EXPECT_EQ(done, 8);
+  const ProgramRun wrong = fit({"--solver", "newton"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("newton"), std::string::npos);
+}
+
+TEST_F(Fit, MakesAClosedSurfaceOfAMask) {
+  ASSERT_EQ(run_angiospline({"phantom", "potato", "--snr", "8", "-o", folder_ / "potato.nrrd",
+                             "--truth", folder_ / "potato_truth.nrrd"})
+                .exit_code,
+            0);
+  const ProgramRun run = run_angiospline(
+      {"fit", folder_ / "potato_truth.nrrd", folder_ / "potato.nrrd", "-o", folder_ / "potato.json",
+       folder_ / "potato.step", "--truth", folder_ / "potato_truth.nrrd", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto json = nlohmann::json::parse(run.out);
+  EXPECT_LT(json["missed_percent"], 2);
+  EXPECT_EQ(json["check"]["solids"], 1);
+  EXPECT_TRUE(json["check"]["valid"]);
+  EXPECT_EQ(json["check"]["genus"], 0);
+  EXPECT_LT(json["check"]["max_normal_angle_deg"], 0.01);
 }
 
 TEST_F(Fit, RefinesAModelAsItIsWithoutCapture) {
@@ -82,7 +134,11 @@ TEST_F(Fit, SaysInOneLineWhatIsWrong) {
 
   refused({"fit", seed, image, "-o", out, "--truth", folder_ / "apart.nrrd"},
           "apart.nrrd: the truth is not of the image's size");
-  refused({"fit", folder_ / "tree.swc", image, "-o", out}, "only a native model can be fitted");
+  refused({"fit", folder_ / "tree.swc", image, "-o", out},
+          "only a native model or a mask can be fitted");
+  refused({"fit", seed, image, "-o", out, "--solver", "sparse", "--strength", "0"}, "strength");
+  refused({"fit", seed, image, "-o", out, "--solver", "sparse", "--stiffness", "-1"}, "spring");
+  refused({"fit", seed, image, "-o", out, "--potential", "gravity"}, "--solver");
   refused({"fit", seed, image, "-o", out, "--residual", folder_ / "r.stl"}, ".glb or .vtp");
   EXPECT_FALSE(std::filesystem::exists(out));
 }

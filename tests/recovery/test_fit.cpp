@@ -1,4 +1,5 @@
 // The default fit: profile sums on analytic walls, then whole models on phantoms.
+#include <atomic>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -138,6 +139,28 @@ TEST(FitRings, FinerBodiesAreTheSameSurfaces) {
   EXPECT_LT(certify(finer)->max_normal_angle_deg, 1e-6);
 }
 
+TEST(FitRings, FewerKnotsKeepEndsTangentPlanesAndTheToleranceGiven) {
+  const auto phantom = make_phantom(PhantomKind::kBifurcation);
+  const auto model = seed_model(phantom->tree);
+  const SurfaceNetwork fine = with_finer_bodies(model->network, 0.3);
+  const double tolerance = 0.02;
+  const SurfaceNetwork fewer = with_fewer_knots(fine, tolerance);
+  ASSERT_FALSE(find_defect(fewer));
+  EXPECT_LT(fewer.control_points_mm.cols(), fine.control_points_mm.cols() * 3 / 4);
+  double farthest = 0;
+  for (int p = 0; p < static_cast<int>(fine.patches.size()); ++p) {
+    const auto a = patch_surface(fine, p), b = patch_surface(fewer, p);
+    for (int i = 0; i <= 40; ++i) {
+      const double u = a.u().first() + (a.u().last() - a.u().first()) * i / 40;
+      for (const double v : {0.0, 0.3, 0.9}) {
+        farthest = std::max(farthest, (a.at(u, v) - b.at(u, v)).norm());
+      }
+    }
+  }
+  EXPECT_LE(farthest, tolerance);
+  EXPECT_LT(certify(fewer)->max_normal_angle_deg, 1e-6);
+}
+
 TEST(FitModel, PutsANoisyCylinderOnItsWall) {
   PhantomOptions options;
   options.snr = 4;
@@ -180,6 +203,43 @@ TEST(FitModel, MovesJunctionsAndBodiesTogetherAndKeepsThemSmooth) {
           fitted->model.network.patches[static_cast<std::size_t>(side.patch)], side.side, 0.3);
       EXPECT_NEAR((surface.at(uv.x(), uv.y()) - rim.center_mm).dot(rim.normal), 0.0, 1e-9);
     }
+  }
+}
+
+TEST(FitModel, FindsTheWallFromAStartWhollyInsideTheVessel) {
+  PhantomOptions options;
+  options.snr = 4;
+  const auto phantom = make_phantom(PhantomKind::kCylinder, options);
+  CenterlineTree start = phantom->tree;
+  for (CenterlineBranch& branch : start.branches) branch.radii_mm *= 0.5;
+  const auto fitted = fit_model(*seed_model(start), grey_of(*phantom));
+  ASSERT_TRUE(fitted) << fitted.error().message();
+  EXPECT_EQ(fitted->report.recaptured.size(), 1U);
+  EXPECT_LT(mean_distance(fitted->model.network, phantom->tree), 0.15);
+}
+
+TEST(FitModel, ShowsItsProgressAndStopsWhenAsked) {
+  PhantomOptions options;
+  options.snr = 8;
+  const auto phantom = make_phantom(PhantomKind::kBentVessel, options);
+  const Image<float> image = grey_of(*phantom);
+  const auto seed = seed_model(phantom->tree);
+  std::atomic<int> reports{0};
+  Progress progress;
+  progress.report = [&](std::string_view, double fraction) {
+    EXPECT_TRUE(fraction >= 0 && fraction <= 1);
+    ++reports;
+  };
+  ASSERT_TRUE(fit_model(*seed, image, {}, progress));
+  const int all = reports;
+  EXPECT_GT(all, 5);
+  for (const int stop_at : {0, all / 3, 2 * all / 3}) {
+    reports = 0;
+    progress.stop_requested = [&] { return reports >= stop_at; };
+    const auto stopped = fit_model(*seed, image, {}, progress);
+    ASSERT_FALSE(stopped) << stop_at;
+    EXPECT_EQ(stopped.error().kind, ErrorKind::kCancelled);
+    EXPECT_LT(reports, all);
   }
 }
 
