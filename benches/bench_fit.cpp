@@ -82,6 +82,9 @@ Result<Outcome> outcome(const FitPhantom& phantom, const Model& start, const Ima
   const auto before = std::chrono::steady_clock::now();
   FitOptions options;
   if (std::getenv("WAVE")) options.displacement.wave_factors = {from_environment("WAVE", 1)};
+  if (std::getenv("HW")) options.displacement.half_windows_vox = {1.5, from_environment("HW", 1)};
+  options.rounds = static_cast<int>(from_environment("ROUNDS", 1));
+  options.reduction = from_environment("REDUCE", options.reduction);
   const auto fitted = fit_model(start, image, options);
   if (!fitted) return fail(fitted.error());
   Outcome o;
@@ -257,9 +260,12 @@ void starts(const std::vector<std::string>& only) {
             }
             worst = std::max(worst, o->accuracy.mean_vox);
             sum += o->accuracy.mean_vox;
-            if (o->accuracy.mean_vox > (snr > 4 ? 0.1 : 0.15) || !o->sound) {
-              std::printf("   %s: %.3f%s\n%s", what.c_str(), o->accuracy.mean_vox,
-                          o->sound ? "" : " UNSOUND", o->told.c_str());
+            if (o->accuracy.mean_vox > (snr > 4 ? 0.1 : 0.15) || !o->sound || std::getenv("ALL")) {
+              std::printf(
+                  "   %s: %.3f (p95 %.3f, bias %+.3f, wave %.1f, %.0f free, %d points)%s\n%s",
+                  what.c_str(), o->accuracy.mean_vox, o->accuracy.p95_vox, o->accuracy.bias_vox,
+                  o->wave, o->freedom, o->control_points, o->sound ? "" : " UNSOUND",
+                  o->told.c_str());
             }
           }
         }

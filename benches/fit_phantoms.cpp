@@ -101,7 +101,7 @@ FitPhantom fit_phantom(PhantomKind kind, const Vec3& spacing) {
   options.vessel = kBackground + kContrast;
   if (kind == PhantomKind::kRandomTree) {
     options.ends = 11;
-    options.field_mm = 128;
+    options.field_mm = 144;
     options.seed = 3;
   }
   auto made = make_phantom(kind, options);

@@ -26,7 +26,7 @@ struct FitPhantom {
 
 inline constexpr double kBackground = 200, kContrast = 1000;
 
-// The phantoms of recovery/phantom.h; spacing in mm. The tree has 11 ends in 128 mm, seed 3.
+// The phantoms of recovery/phantom.h; spacing in mm. The tree has 21 branches in 144 mm, seed 3.
 FitPhantom fit_phantom(PhantomKind kind, const Vec3& spacing_mm = Vec3::Ones());
 
 // The bent tube with another of its kind beside it, wall to wall one diameter apart. Only the first

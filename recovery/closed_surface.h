@@ -12,7 +12,7 @@ namespace angiospline {
 
 // An ellipsoid of 6 n^2 bi-quintic patches, n = `divisions`: the faces of a cube, each cut n times
 // along both sides, blown up. Neighbours have common tangent planes to rounding; it differs from
-// the ellipsoid by less than 0.1 % of its half axes. The columns of `half_axes_mm` are those, at
+// the ellipsoid by less than 0.2 % of its half axes. The columns of `half_axes_mm` are those, at
 // right angles. The region is "wall_<name>". Requires divisions of 1 to 4.
 SurfaceNetwork closed_surface(const Vec3& center_mm, const Mat3& half_axes_mm,
                               const std::string& name, int divisions = 1);

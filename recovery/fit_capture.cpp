@@ -16,16 +16,22 @@ namespace {
 
 constexpr int kAngles = 24;            // of a section, for grey levels and moments
 constexpr int kFewestAngles = 16;      // of a section whose wall is measured
-constexpr double kLevelRadii = 6.0;    // along a branch over which its levels are averaged
+constexpr double kInsideRadii = 12.0;  // along a branch over which its levels are averaged
+constexpr double kOutsideRadii = 6.0;  // the background may rise
 constexpr double kStationRadii = 0.5;  // distance of sections, in radii ...
 constexpr double kStationVox = 1.5;    // ... and at least in voxels
 constexpr int kFewestStations = 4;
 constexpr double kGoodEvidence = 0.6;  // of the contrast: the sections lie on the vessel
 constexpr double kNoEvidence = 0.3;    // there is none
 constexpr std::array<double, 5> kReaches{1.0, 1.5, 2.2, 3.3, 5.0};
-constexpr double kEnoughContrast = 0.7;  // of the largest at any reach
+constexpr double kEnoughContrast = 0.85;  // of the largest at any reach
+constexpr double kLeastContrast = 0.3;    // of the noise around: less is no contrast
+constexpr double kNormalScale = 1.4826;   // median absolute deviation to standard deviation
+constexpr int kFewestClear = 3;  // stations of a branch that are measured, if need be near others
 constexpr int kWideRounds = 6;
-constexpr int kNarrowRounds = 4;
+// Voxels on either side of the wall, in each narrow round.
+constexpr std::array<double, 6> kWindows{2.0, 1.5, 1.0, 0.75, 0.75, 0.75};
+constexpr int kNarrowRounds = static_cast<int>(kWindows.size());
 constexpr int kNeighbours = 4;   // sections on either side that moments are averaged over
 constexpr double kRimVox = 1.5;  // of an end that is not looked at
 
@@ -110,16 +116,11 @@ class Capture {
     CapturedTree result;
     for (std::size_t b = 0; b < branches_.size(); ++b) measure_levels(branches_[b]);
     share_levels();
-    for (std::size_t b = 0; b < branches_.size(); ++b) {
-      if (progress_.should_stop()) return fail(cancelled("capture"));
-      progress_.at("capture", static_cast<double>(b) / static_cast<double>(branches_.size()));
-      Branch& branch = branches_[b];
-      if (branch.evidence < kGoodEvidence && lead_to_vessel(branch)) {
-        result.recaptured.push_back(tree_.branches[b].name);
-      }
-    }
+    const std::vector<std::size_t> led = lead_to_vessels();
+    for (const std::size_t b : led) result.recaptured.push_back(tree_.branches[b].name);
     for (int round = 0; round < kNarrowRounds; ++round) {
       if (progress_.should_stop()) return fail(cancelled("capture"));
+      progress_.at("capture", static_cast<double>(round) / kNarrowRounds);
       const bool last = round + 1 == kNarrowRounds;
       tbb::parallel_for(std::size_t{0}, branches_.size(),
                         [&](std::size_t b) { narrow_round(branches_[b], round, last); });
@@ -138,27 +139,41 @@ class Capture {
   }
 
  private:
-  // Stations that another branch of their junction, or an open end, comes near to.
+  // Stations that another branch of their junction, or an open end, comes near to are not clear. A
+  // start that is too thick may have none that are: then those count that are clear of thinner
+  // vessels.
   void find_clear() {
-    for (std::size_t n = 0; n < at_node_.size(); ++n) {
-      const Vec3& node = tree_.nodes[n].position_mm;
-      for (const int b : at_node_[n]) {
-        for (Station& s : branches_[at(b)].stations) {
-          const double away = (s.center - node).norm();
-          if (at_node_[n].size() == 1) {
-            if (away < kRimVox * voxel_) s.clear = false;
-            continue;
-          }
-          if (away < s.radius) s.clear = false;
-          for (const int other : at_node_[n]) {
-            if (other == b || away > 8 * s.radius) continue;
-            for (const Station& o : branches_[at(other)].stations) {
-              if ((s.center - o.center).norm() < s.radius + o.radius + voxel_) s.clear = false;
-            }
-          }
+    for (std::size_t b = 0; b < branches_.size(); ++b) {
+      std::ptrdiff_t clear = 0;
+      for (const double share : {1.0, 0.7, 0.5, 0.35}) {
+        std::vector<Station>& stations = branches_[b].stations;
+        for (Station& s : stations) s.clear = is_clear(s, static_cast<int>(b), share);
+        clear = std::count_if(stations.begin(), stations.end(),
+                              [](const Station& s) { return s.clear; });
+        if (clear >= kFewestClear) break;
+      }
+    }
+  }
+
+  // Radii count by `share`.
+  bool is_clear(const Station& s, int branch, double share) const {
+    const CenterlineBranch& own = tree_.branches[at(branch)];
+    for (const int n : {own.from, own.to}) {
+      const double away = (s.center - tree_.nodes[at(n)].position_mm).norm();
+      if (at_node_[at(n)].size() == 1) {
+        const Vec3 node = tree_.nodes[at(n)].position_mm;
+        if ((s.start - node).norm() < kRimVox * voxel_) return false;
+        continue;
+      }
+      if (away < share * s.radius) return false;
+      for (const int other : at_node_[at(n)]) {
+        if (other == branch || away > 8 * s.radius) continue;
+        for (const Station& o : branches_[at(other)].stations) {
+          if ((s.center - o.center).norm() < share * (s.radius + o.radius) + voxel_) return false;
         }
       }
     }
+    return true;
   }
 
   double mean_on_ring(const Station& s, double radius) const {
@@ -202,17 +217,44 @@ class Capture {
     const double spacing =
         (branch.stations.back().along - branch.stations.front().along) / static_cast<double>(n - 1);
     const double radius = branch.stations[n / 2].radius;
-    const auto reach = static_cast<std::size_t>(std::ceil(kLevelRadii * radius / spacing));
+    const auto within = [&](double radii) {
+      return static_cast<std::size_t>(std::ceil(radii * radius / spacing));
+    };
+    const std::size_t reach_in = within(kInsideRadii), reach_out = within(kOutsideRadii);
     for (std::size_t k = 0; k < n; ++k) {
-      double sum_in = 0, sum_out = 0, count_in = 0, count_out = 0;
-      for (std::size_t j = k > reach ? k - reach : 0; j <= std::min(n - 1, k + reach); ++j) {
-        if (!branch.stations[j].clear && j != k) continue;
-        if (std::isfinite(in[j])) sum_in += in[j], count_in += 1;
-        if (std::isfinite(out[j])) sum_out += out[j], count_out += 1;
-      }
-      branch.levels[k].inside = sum_in / count_in;
-      branch.levels[k].outside = sum_out / count_out;
+      branch.levels[k].inside = mean_around(branch, in, k, reach_in);
+      branch.levels[k].outside = mean_around(branch, out, k, reach_out);
     }
+  }
+
+  // Over the measured stations within `reach` of station k, and itself.
+  static double mean_around(const Branch& branch, const std::vector<double>& values, std::size_t k,
+                            std::size_t reach) {
+    double sum = 0, count = 0;
+    for (std::size_t j = k > reach ? k - reach : 0; j <= std::min(values.size() - 1, k + reach);
+         ++j) {
+      if ((!branch.stations[j].clear && j != k) || !std::isfinite(values[j])) continue;
+      sum += values[j];
+      count += 1;
+    }
+    return sum / count;
+  }
+
+  // Deviation of the greys around the stations from their medians: noise, and what else is there.
+  double noise_around() const {
+    std::vector<double> deviations;
+    for (const Branch& branch : branches_) {
+      for (const Station& s : branch.stations) {
+        std::vector<double> greys;
+        for (int k = 0; k < kAngles; ++k) {
+          const Vec3 p = s.center + (s.radius + 2.5 * voxel_) * s.direction(k);
+          if (field_.covers(p)) greys.push_back(field_.at(p));
+        }
+        const double middle = median(greys);
+        for (const double grey : greys) deviations.push_back(std::abs(grey - middle));
+      }
+    }
+    return kNormalScale * median(std::move(deviations));
   }
 
   // The tree's levels, and how far each branch's own reach towards them.
@@ -228,7 +270,7 @@ class Capture {
     std::sort(in.begin(), in.end());
     const double inside = in.empty() ? 0.0 : in[in.size() * 3 / 4];
     common_ = {inside, median(out)};
-    bool lost = !(common_.contrast() > 0);
+    bool lost = !(common_.contrast() > kLeastContrast * noise_around());
     for (Branch& branch : branches_) set_evidence(branch);
     std::vector<double> all;
     for (const Branch& branch : branches_) all.push_back(branch.evidence);
@@ -332,43 +374,63 @@ class Capture {
     return disc;
   }
 
-  // Moves a branch by the moments of what is bright around it; false if there is nothing.
-  bool lead_to_vessel(Branch& branch) const {
-    if (!(common_.contrast() > 0)) return false;
-    const std::vector<Station> before = branch.stations;
-    for (int round = 0; round < kWideRounds; ++round) {
-      const Branch now = branch;
-      for (std::size_t k = 0; k < now.stations.size(); ++k) {
-        if (!now.stations[k].clear) continue;
-        const Disc disc = disc_at(now, k, 2 * round < kWideRounds ? reach_ : 1.0);
-        double area = 0;
-        Vec2 moment = Vec2::Zero();
-        for (const Disc::Cell& cell : disc.cells) {
-          const double f = (cell.grey - common_.outside) / common_.contrast();
-          area += f * disc.cell_area;
-          moment += f * disc.cell_area * cell.at;
-        }
-        Station& s = branch.stations[k];
-        if (area < 0.05 * std::numbers::pi * disc.radius * disc.radius) continue;
-        Vec2 shift = moment / area;
-        const double most = disc.radius / 2;
-        if (shift.norm() > most) shift *= most / shift.norm();
-        s.center += shift.x() * s.e1 + shift.y() * s.e2;
-        s.radius = std::clamp(std::sqrt(area / std::numbers::pi), 0.6 * s.radius, 1.7 * s.radius);
-      }
-      follow(branch);
-      smooth_moves(branch, 2);
-      carry_frames(branch.stations);
+  // Leads branches that do not lie on their vessels there; those that it found.
+  std::vector<std::size_t> lead_to_vessels() {
+    std::vector<std::size_t> lost;
+    for (std::size_t b = 0; b < branches_.size(); ++b) {
+      if (branches_[b].evidence < kGoodEvidence) lost.push_back(b);
     }
+    if (lost.empty() || !(common_.contrast() > 0)) return {};
+    const std::vector<Branch> before = branches_;
+    for (int round = 0; round < kWideRounds && !progress_.should_stop(); ++round) {
+      tbb::parallel_for(std::size_t{0}, lost.size(),
+                        [&](std::size_t k) { wide_round(branches_[lost[k]], round); });
+      find_clear();  // radii are others now
+    }
+    std::vector<std::size_t> found;
+    for (const std::size_t b : lost) {
+      measure_again(branches_[b]);
+      if (branches_[b].evidence >= kNoEvidence) {
+        found.push_back(b);
+      } else {
+        branches_[b].stations = before[b].stations;
+      }
+    }
+    find_clear();
+    for (Branch& branch : branches_) measure_again(branch);
+    return found;
+  }
+
+  void measure_again(Branch& branch) const {
     measure_levels(branch);
     fill_levels(branch);
     set_evidence(branch);
-    if (branch.evidence >= kNoEvidence) return true;
-    branch.stations = before;
-    measure_levels(branch);
-    fill_levels(branch);
-    set_evidence(branch);
-    return false;
+  }
+
+  // Moves a branch by the moments of what is bright around it.
+  void wide_round(Branch& branch, int round) const {
+    const Branch now = branch;
+    for (std::size_t k = 0; k < now.stations.size(); ++k) {
+      if (!now.stations[k].clear) continue;
+      const Disc disc = disc_at(now, k, 2 * round < kWideRounds ? reach_ : 1.0);
+      double area = 0;
+      Vec2 moment = Vec2::Zero();
+      for (const Disc::Cell& cell : disc.cells) {
+        const double f = (cell.grey - common_.outside) / common_.contrast();
+        area += f * disc.cell_area;
+        moment += f * disc.cell_area * cell.at;
+      }
+      Station& s = branch.stations[k];
+      if (area < 0.05 * std::numbers::pi * disc.radius * disc.radius) continue;
+      Vec2 shift = moment / area;
+      const double most = disc.radius / 2;
+      if (shift.norm() > most) shift *= most / shift.norm();
+      s.center += shift.x() * s.e1 + shift.y() * s.e2;
+      s.radius = std::clamp(std::sqrt(area / std::numbers::pi), 0.6 * s.radius, 1.7 * s.radius);
+    }
+    follow(branch);
+    smooth_moves(branch, 2);
+    carry_frames(branch.stations);
   }
 
   void set_evidence(Branch& branch) const {
@@ -436,7 +498,7 @@ class Capture {
     if (branch.evidence < kNoEvidence) return;
     measure_levels(branch);
     fill_levels(branch);
-    const double half = round == 0 ? 2.0 : round == 1 ? 1.5 : 1.0;
+    const double half = kWindows[at(round)];
     const Branch now = branch;
     for (std::size_t k = 0; k < now.stations.size(); ++k) {
       Station& s = branch.stations[k];

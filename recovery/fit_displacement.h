@@ -23,7 +23,7 @@ WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& 
                      const Eigen::VectorXd& displacement_mm);
 
 struct DisplacementOptions {
-  std::vector<double> half_windows_vox{1.5, 1.0};  // of the profile, one for each round
+  std::vector<double> half_windows_vox{1.5, 0.75};  // of the profile, one for each round
   // Waves that are tried, in multiples of the rule's own.
   std::vector<double> wave_factors{0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
   double largest_move_radii = 0.5;  // of any node from where the mesh has it

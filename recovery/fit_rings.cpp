@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/contract.h"
+#include "kernel/fit.h"
 #include "kernel/reduce_engine.h"
 #include "kernel/refinement.h"
 
@@ -188,6 +189,101 @@ void set_rows(SurfaceNetwork& network, const StripRing& ring, const KnotVector& 
   }
 }
 
+// Places along a ring that are equally far apart on its axis: parameters u, and distances as parts
+// of the whole.
+struct AxisSamples {
+  std::vector<double> u, along;
+  double length_mm = 0.0;
+  double first_speed_mm = 0.0, last_speed_mm = 0.0;  // of the axis in u, at its ends
+};
+
+AxisSamples along_axis(const BSplineCurve<3>& axis, int count) {
+  constexpr int kSteps = 32;  // of each span
+  std::vector<double> u{axis.knots().first()}, length{0.0};
+  const std::vector<double> breaks = axis.knots().breakpoints();
+  Vec3 before = axis.at(u.front());
+  for (std::size_t b = 0; b + 1 < breaks.size(); ++b) {
+    for (int k = 1; k <= kSteps; ++k) {
+      u.push_back(breaks[b] + (breaks[b + 1] - breaks[b]) * k / kSteps);
+      const Vec3 p = axis.at(u.back());
+      length.push_back(length.back() + (p - before).norm());
+      before = p;
+    }
+  }
+  AxisSamples samples;
+  samples.length_mm = length.back();
+  samples.first_speed_mm = axis.at(u.front(), 1).norm();
+  samples.last_speed_mm = axis.at(u.back(), 1).norm();
+  std::size_t k = 1;
+  for (int i = 0; i < count; ++i) {
+    const double part = static_cast<double>(i) / (count - 1);
+    const double wanted = part * length.back();
+    while (k + 1 < length.size() && length[k] < wanted) ++k;
+    const double step = length[k] - length[k - 1];
+    const double t = step > 0 ? std::clamp((wanted - length[k - 1]) / step, 0.0, 1.0) : 0.0;
+    samples.u.push_back(u[k - 1] + t * (u[k] - u[k - 1]));
+    samples.along.push_back(part);
+  }
+  return samples;
+}
+
+// The ring over the length of its axis instead of u, which wanders where the seed was drawn
+// through sections at unequal distances, and then over as few knots as the tolerance allows.
+// Nothing if it cannot be said so with the same number of knots.
+std::optional<DirectionResult> reduced_ring(const SurfaceNetwork& network, const StripRing& ring,
+                                            double tolerance_mm) {
+  constexpr int kSamples = 4;          // of each span
+  constexpr double kFineShare = 0.25;  // of the tolerance, for the change of parameter
+  const int n = ring.points();
+  std::vector<BSplineCurve<3>> lines;
+  Points3 center = Points3::Zero(3, ring.rows());
+  for (int c = 0; c < n; ++c) {
+    Points3 points(3, ring.rows());
+    for (int i = 0; i < ring.rows(); ++i) {
+      points.col(i) = network.control_points_mm.col(ring.columns(i, c));
+    }
+    center += points / n;
+    lines.emplace_back(ring.u, points);
+  }
+  const int spans = 2 * (ring.rows() - kPerPatch);
+  std::vector<double> breaks;
+  for (int k = 0; k <= spans; ++k) breaks.push_back(static_cast<double>(k) / spans);
+  const KnotVector knots = KnotVector::clamped(kPerPatch, breaks);
+  const AxisSamples at_axis = along_axis(BSplineCurve<3>(ring.u, center), kSamples * spans + 1);
+  if (!(at_axis.first_speed_mm > 0 && at_axis.last_speed_mm > 0)) return {};
+  Points3 rows(3, static_cast<Eigen::Index>(knots.control_point_count()) * n);
+  double farthest = 0;
+  for (int c = 0; c < n; ++c) {
+    const BSplineCurve<3>& line = lines[at(c)];
+    Points3 points(3, static_cast<Eigen::Index>(at_axis.u.size()));
+    for (std::size_t k = 0; k < at_axis.u.size(); ++k) {
+      points.col(static_cast<Eigen::Index>(k)) = line.at(at_axis.u[k]);
+    }
+    CurveFitOptions<3> held;
+    const double first = ring.u.first(), last = ring.u.last();
+    held.first = {line.at(first),
+                  Vec3(line.at(first, 1) * at_axis.length_mm / at_axis.first_speed_mm)};
+    held.last = {line.at(last), Vec3(line.at(last, 1) * at_axis.length_mm / at_axis.last_speed_mm)};
+    const auto fit = fit_curve<3>(knots, at_axis.along, points, held);
+    if (!fit) return {};
+    farthest = std::max(farthest, fit->largest_residual);
+    for (int i = 0; i < knots.control_point_count(); ++i) {
+      rows.col(i * n + c) = fit->curve.control_points().col(i);
+    }
+  }
+  if (farthest > kFineShare * tolerance_mm) return {};
+  const std::vector<Knot> kept;
+  return reduce_direction({.knots = knots,
+                           .points = rows.data(),
+                           .stride = 3 * n,
+                           .group = 3,
+                           .tolerance = (1 - kFineShare) * tolerance_mm,
+                           .held_first = kHeld,
+                           .held_last = kHeld,
+                           .kept = kept,
+                           .polish = 1});
+}
+
 }  // namespace
 
 SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_mm) {
@@ -200,24 +296,7 @@ SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_
   }
   std::vector<std::optional<DirectionResult>> reduced(rings.size());
   tbb::parallel_for(std::size_t{0}, rings.size(), [&](std::size_t r) {
-    const StripRing& ring = rings[r];
-    const int n = ring.points();
-    Points3 rows(3, static_cast<Eigen::Index>(ring.rows()) * n);
-    for (int i = 0; i < ring.rows(); ++i) {
-      for (int c = 0; c < n; ++c) {
-        rows.col(i * n + c) = network.control_points_mm.col(ring.columns(i, c));
-      }
-    }
-    const std::vector<Knot> kept;
-    reduced[r] = reduce_direction({.knots = ring.u,
-                                   .points = rows.data(),
-                                   .stride = 3 * n,
-                                   .group = 3,
-                                   .tolerance = tolerance_mm,
-                                   .held_first = kHeld,
-                                   .held_last = kHeld,
-                                   .kept = kept,
-                                   .polish = 0});
+    reduced[r] = reduced_ring(network, rings[r], tolerance_mm);
   });
   std::vector<Vec3> pool;
   for (Eigen::Index c = 0; c < network.control_points_mm.cols(); ++c) {
@@ -225,7 +304,8 @@ SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_
   }
   for (std::size_t r = 0; r < rings.size(); ++r) {
     const StripRing& ring = rings[r];
-    const int n = ring.points(), rows = reduced[r]->knots.control_point_count();
+    const int n = ring.points(),
+              rows = reduced[r] ? reduced[r]->knots.control_point_count() : ring.rows();
     if (rows >= ring.rows()) continue;
     Eigen::MatrixXi columns(rows, n);
     columns.row(0) = ring.columns.row(0);

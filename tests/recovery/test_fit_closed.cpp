@@ -26,7 +26,7 @@ TEST(ClosedSurface, IsASmoothSphereOfSixPatchesAndMore) {
     const auto mesh = tessellate(ball);
     ASSERT_TRUE(mesh);
     for (Eigen::Index k = 0; k < mesh->mesh.points_mm.cols(); ++k) {
-      EXPECT_NEAR((mesh->mesh.points_mm.col(k) - Vec3(1, 2, 3)).norm(), 4, 0.004);
+      EXPECT_NEAR((mesh->mesh.points_mm.col(k) - Vec3(1, 2, 3)).norm(), 4, 0.008);
     }
     const auto certificate = certify(ball);
     EXPECT_TRUE(certificate->closed && certificate->valid && !certificate->self_intersecting);
@@ -44,7 +44,7 @@ TEST(ClosedSurface, IsFoundAmongOtherRegions) {
   ASSERT_EQ(closed.size(), 2U);
   EXPECT_EQ(closed[0].size(), 6U);
   EXPECT_EQ(closed[1].front(), 6);
-  two.patches[6].u = KnotVector(5, {0, 0, 0, 0, 0, 0, 0.5, 1, 1, 1, 1, 1, 1});
+  two.patches[6].u = KnotVector::clamped(5, {0.0, 0.5, 1.0});
   EXPECT_TRUE(closed_patches(two)[1].empty());
 }
 
