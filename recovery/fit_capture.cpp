@@ -257,8 +257,8 @@ class Capture {
     return kNormalScale * median(std::move(deviations));
   }
 
-  // The tree's levels, and how far each branch's own reach towards them.
-  void share_levels() {
+  // Of all stations together: the brighter ones' inside, the middle one's outside.
+  WallLevels levels_of_stations() const {
     std::vector<double> in, out;
     for (const Branch& branch : branches_) {
       for (std::size_t k = 0; k < branch.levels.size(); ++k) {
@@ -268,8 +268,12 @@ class Capture {
       }
     }
     std::sort(in.begin(), in.end());
-    const double inside = in.empty() ? 0.0 : in[in.size() * 3 / 4];
-    common_ = {inside, median(out)};
+    return {in.empty() ? 0.0 : in[in.size() * 3 / 4], median(out)};
+  }
+
+  // The tree's levels, and how far each branch's own reach towards them.
+  void share_levels() {
+    common_ = levels_of_stations();
     bool lost = !(common_.contrast() > kLeastContrast * noise_around());
     for (Branch& branch : branches_) set_evidence(branch);
     std::vector<double> all;
@@ -386,6 +390,10 @@ class Capture {
       tbb::parallel_for(std::size_t{0}, lost.size(),
                         [&](std::size_t k) { wide_round(branches_[lost[k]], round); });
       find_clear();  // radii are others now
+      // What was taken for background may have been half vessel; nearer to the wall it is not.
+      for (Branch& branch : branches_) measure_levels(branch);
+      const WallLevels nearer = levels_of_stations();
+      if (nearer.contrast() > common_.contrast()) common_ = nearer;
     }
     std::vector<std::size_t> found;
     for (const std::size_t b : lost) {
