@@ -10,9 +10,9 @@ namespace angiospline {
 namespace {
 
 // Second differences of a junction's move: the first that passes every gate.
-const std::vector<double> kRoughness{0.002, 0.03, 0.5};
+const std::vector<double> kRoughness{0.0003, 0.002, 0.03, 0.5};
 const std::vector<double> kClosedRoughness{0.0, 0.002, 0.03};
-constexpr double kClosedAnchor = 0.02;  // shape comes before the places of parameters
+constexpr double kAnchor = 0.02;  // shape comes before the places of parameters
 constexpr int kClosedRatioDegree = 1;
 constexpr double kLeastJacobian = 0.03;
 
@@ -123,7 +123,9 @@ MovedPatches move_junction(const SurfaceNetwork& network, const std::vector<Stri
     const auto found = shift.find(group.columns[k]);
     if (found != shift.end()) start.col(static_cast<Eigen::Index>(k)) = found->second;
   }
-  return move_from(group, samples, start, {}, kRoughness);
+  PatchWeights weights;
+  weights.anchor = kAnchor;
+  return move_from(group, samples, start, weights, kRoughness);
 }
 
 MovedPatches move_closed(const SurfaceNetwork& network, const std::vector<int>& patches,
@@ -137,7 +139,7 @@ MovedPatches move_closed(const SurfaceNetwork& network, const std::vector<int>& 
   }
   if (!is_smooth(group)) return refused("it is not smooth to begin with");
   PatchWeights weights;
-  weights.anchor = kClosedAnchor;
+  weights.anchor = kAnchor;
   const Points3 start = Points3::Zero(3, group.net.points.cols());
   return move_from(group, samples, start, weights, kClosedRoughness);
 }

@@ -122,15 +122,8 @@ class Fitter {
     return fitted;
   }
 
-  // The standard error of a wall with so many degrees of freedom, from noise alone, is
-  // sqrt(window voxels / area) of a voxel over SNR (docs/fit.md).
   void reduce(SurfaceNetwork& network, FitReport& report) const {
-    const double voxel = field_.voxel_mm();
-    const double window = 2 * options_.displacement.half_windows_vox.back();
-    const double freedom = std::max(1.0, report.degrees_of_freedom);
-    const double error =
-        voxel / report.snr * std::sqrt(window * freedom * voxel * voxel / report.area_mm2);
-    report.reduction_mm = options_.reduction * error;
+    report.reduction_mm = options_.reduction * field_.voxel_mm() / report.snr;
     if (report.reduction_mm > 0) network = with_fewer_knots(network, report.reduction_mm);
   }
 
@@ -171,7 +164,6 @@ class Fitter {
     network = std::move(moved->network);
     report.held = std::move(moved->held);
     const Eigen::VectorXd& mass = smoother.mass_mm2();
-    report.area_mm2 = mass.sum();
     report.mean_move_mm = mass.dot(displacement.normal_mm.cwiseAbs()) / mass.sum();
     return {};
   }

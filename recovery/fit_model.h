@@ -20,9 +20,9 @@ struct FitOptions {
   bool dark = false;        // vessels are darker than their background
   int rounds = 1;           // of free-form refinement of the surface
   double body_spans = 1.0;  // length of a body's spans, in radii, while it is fitted
-  // What data reduction may move a body by afterwards, in standard errors of the fitted wall; 0: no
-  // reduction. A mean error e so becomes at most about e (1 + reduction^2 / 6).
-  double reduction = 0.6;
+  // What data reduction may move a body's wall by afterwards, in voxels over SNR: about half of
+  // what noise leaves. 0: no reduction.
+  double reduction = 0.15;
   DisplacementOptions displacement;
   SeedOptions seed;
 };
@@ -33,7 +33,6 @@ struct FitReport {
   double snr = 0.0;       // contrast over noise, at most 20
   int iterations = 0;     // times that the wall was measured
   int nodes = 0;          // of the finite-element mesh
-  double area_mm2 = 0.0;  // of the wall
   int control_points = 0;
   int control_points_before_reduction = 0;
   double reduction_mm = 0.0;        // its tolerance; 0: none

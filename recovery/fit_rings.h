@@ -36,10 +36,11 @@ std::vector<StripRing> strip_rings(const SurfaceNetwork& network);
 // `radii` of its ring (mean distance from its centre). Pool columns are numbered anew.
 SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii);
 
-// Bodies over the length of their axes, with as few knots as leave every point of them within the
-// tolerance (kernel/reduce.h). At the ends points stay as they are, and derivatives along the
-// branch but for one factor; the relations between neighbouring patches hold in every row: tangent
-// planes stay common. Pool columns are numbered anew. Requires a positive tolerance.
+// Bodies over the length of their axes, cut across it and fitted anew with the fewest equal spans
+// that leave every place of them within the tolerance along the normal; one that would take as many
+// as it has stays as it is. End rows stay; tangent planes there contain the axis if they did, and
+// the relations between neighbouring patches hold in every row: tangent planes stay common. Pool
+// columns are numbered anew. Requires a positive tolerance.
 SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_mm);
 
 }  // namespace angiospline
