@@ -65,12 +65,11 @@ TEST_F(Fit, WritesTheModelItsResidualAndItsDistanceFromTheTruth) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "residual.glb"));
 }
 
-TEST_F(Fit, TakesEachSolverAndPotentialByName) {
+TEST_F(Fit, TakesSolversAndPotentialsByName) {
   int done = 0;
-  for (const char* solver : {"sparse", "euler-svd", "euler-dft", "euler-dft-phantom", "central",
-                             "central-dft", "runge-kutta-1", "runge-kutta-4"}) {
+  for (const char* solver : {"sparse", "euler-dft-phantom", "central", "runge-kutta-4"}) {
     const char* potential = done % 2 == 0 ? "gravity" : "spring";
-    const ProgramRun run = fit({"--solver", solver, "--potential", potential, "--iterations", "40",
+    const ProgramRun run = fit({"--solver", solver, "--potential", potential, "--iterations", "10",
                                 "--residual", folder_ / "force.vtp", "--json"});
     ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 1) << solver << ": " << run.err;
     const auto json = nlohmann::json::parse(run.out);
@@ -80,7 +79,7 @@ TEST_F(Fit, TakesEachSolverAndPotentialByName) {
     EXPECT_TRUE(json["check"]["closed"]);
     ++done;
   }
-  EXPECT_EQ(done, 8);
+  EXPECT_EQ(done, 4);
   const ProgramRun wrong = fit({"--solver", "newton"});
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_NE(wrong.err.find("newton"), std::string::npos);

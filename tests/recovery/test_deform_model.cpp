@@ -38,7 +38,7 @@ Case case_of(PhantomKind kind, const Vec3& spacing = Vec3::Ones()) {
 }
 
 TEST(DeformModel, ComesBackAsAClosedSmoothModelNearerToTheWall) {
-  const Case c = case_of(PhantomKind::kBifurcation, Vec3::Constant(4));
+  const Case c = case_of(PhantomKind::kCylinder, Vec3::Constant(2));
   for (const PotentialKind potential : {PotentialKind::kGravity, PotentialKind::kSpring}) {
     DeformModelOptions options;
     options.potential = potential;
