@@ -138,6 +138,63 @@ Result<BSplineSurface<D>> insert_v(const BSplineSurface<D>& surface, std::vector
   return refine(surface, surface.u(), *v);
 }
 
+// Every span in as many equal pieces.
+std::vector<double> even_cuts(const KnotVector& knots, int pieces) {
+  const std::vector<double> breaks = knots.breakpoints();
+  std::vector<double> added;
+  for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
+    for (int k = 1; k < pieces; ++k) {
+      const double t = breaks[i] + (breaks[i + 1] - breaks[i]) * k / pieces;
+      if (t > breaks[i] && t < breaks[i + 1]) added.push_back(t);
+    }
+  }
+  return added;
+}
+
+// What even cuts come to where that is fewer control points than `fewer`: the bound has no borders
+// between long spans and short ones then, and bends that are alike everywhere want nothing else.
+// cut(pieces) makes the spline, bound(spline) says whether it does.
+template <typename Spline, typename Cut, typename Does>
+std::optional<Spline> cut_evenly(const KnotVector& knots, double ratio, int fewer, const Cut& cut,
+                                 const Does& does) {
+  const int spans = static_cast<int>(knots.breakpoints().size()) - 1;
+  const double law = 0.8 * std::sqrt(ratio);  // a little below what quadratic convergence asks for
+  if (!(law < fewer)) return std::nullopt;
+  for (int pieces = std::max(1, static_cast<int>(law));
+       knots.control_point_count() + spans * (pieces - 1) < fewer; ++pieces) {
+    Result<Spline> finer = cut(even_cuts(knots, pieces));
+    if (!finer) return std::nullopt;
+    if (does(*finer)) return *std::move(finer);
+  }
+  return std::nullopt;
+}
+
+template <int D>
+std::optional<BSplineSurface<D>> cut_evenly_u(const BSplineSurface<D>& surface, int fewer,
+                                              double tolerance) {
+  const BSplineSurface<D> swapped = swap_uv(surface);
+  const double along_u =
+      largest(span_distances(surface.u(), {surface.control_points().data(), surface.v_count(), D}));
+  const double along_v =
+      largest(span_distances(surface.v(), {swapped.control_points().data(), surface.u_count(), D}));
+  if (!(along_v < tolerance)) return std::nullopt;
+  const bool closed = is_periodic_u(surface);
+  return cut_evenly<BSplineSurface<D>>(
+      surface.u(), along_u / (tolerance - along_v), fewer,
+      [&](std::vector<double> added) {
+        return closed ? insert_knots_periodic_u(surface, std::move(added))
+                      : insert_u(surface, std::move(added));
+      },
+      [&](const BSplineSurface<D>& finer) { return control_mesh_distance(finer) <= tolerance; });
+}
+
+// The surface over finer knots along u; a closed direction stays closed.
+template <int D>
+BSplineSurface<D> over_u(const BSplineSurface<D>& surface, const KnotVector& u) {
+  const BSplineSurface<D> finer = transform_u(surface, rewriting_matrix(surface.u(), u), u);
+  return is_periodic_u(surface) ? closed_up_u(finer) : finer;
+}
+
 }  // namespace
 
 template <int D>
@@ -167,7 +224,20 @@ Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
     result.distance = largest(distance);
     const std::vector<double> added =
         cuts(at.knots(), distance, options.tolerance, border_width(round));
-    if (added.empty()) return result;
+    if (added.empty()) {
+      const auto even = cut_evenly<BSplineCurve<D>>(
+          curve.knots(), control_polygon_distance(curve) / options.tolerance,
+          at.knots().control_point_count(),
+          [&](std::vector<double> cut) {
+            return closed ? insert_knots_periodic(curve, std::move(cut))
+                          : insert_knots(curve, std::move(cut));
+          },
+          [&](const BSplineCurve<D>& finer) {
+            return control_polygon_distance(finer) <= options.tolerance;
+          });
+      if (even) result = {*even, control_polygon_distance(*even)};
+      return result;
+    }
     const Eigen::Index count = at.control_points().cols() + static_cast<Eigen::Index>(added.size());
     if (count > options.most_control_points) {
       return fail(too_many(count, options.most_control_points));
@@ -201,7 +271,16 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
     const double worst_u = largest(along_u);
     const double worst_v = largest(along_v);
     result.distance = worst_u + worst_v;
-    if (result.distance <= options.tolerance) return result;
+    if (result.distance <= options.tolerance) {
+      const auto even_v =
+          cut_evenly_u(swap_uv(over_u(surface, at.u())), at.v_count(), options.tolerance);
+      if (even_v) result.surface = swap_uv(*even_v);
+      const auto even_u = cut_evenly_u(swap_uv(over_u(swap_uv(surface), result.surface.v())),
+                                       result.surface.u_count(), options.tolerance);
+      if (even_u) result.surface = *even_u;
+      result.distance = control_mesh_distance(result.surface);
+      return result;
+    }
     const double half = 0.5 * options.tolerance;
     const std::vector<double> added_u =
         cuts(at.u(), along_u, std::max(half, options.tolerance - worst_v), border_width(round));

@@ -49,14 +49,25 @@ struct RefinedSurface {
 // The same curve or surface with knots inserted where and as often as the bound needs it: spans
 // whose part of the bound is above the tolerance are cut in as many equal pieces as the quadratic
 // convergence asks for, until none is. For surfaces the tolerance is shared between the directions
-// so that few control points are needed. Errors: tolerance not positive; a jump inside
-// (multiplicity above the degree), over which no polygon converges; more control points needed than
-// allowed. What is closed stays closed. D is 1 to 4 (surfaces 2 to 4).
+// so that few control points are needed. Where cutting every span of a direction alike needs fewer,
+// that is done instead: never more than uniform refinement. Errors: tolerance not positive; a jump
+// inside (multiplicity above the degree), over which no polygon converges; more control points
+// needed than allowed. What is closed stays closed. D is 1 to 4 (surfaces 2 to 4).
 template <int D>
 Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
                                             const MeshOptions& options);
 template <int D>
 Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
                                               const MeshOptions& options);
+
+// The same for rational ones, held homogeneous, and their projected control polygon or mesh (lines
+// project to lines): every point of either is within `distance` of a point of the other. Requires
+// positive weights. Curves: D 1 to 3. Surfaces: D 2 or 3.
+template <int D>
+Result<RefinedCurve<D + 1>> refine_to_tolerance_rational(const BSplineCurve<D + 1>& curve,
+                                                         MeshOptions options);
+template <int D>
+Result<RefinedSurface<D + 1>> refine_to_tolerance_rational(const BSplineSurface<D + 1>& surface,
+                                                           MeshOptions options);
 
 }  // namespace angiospline

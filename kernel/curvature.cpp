@@ -60,17 +60,55 @@ PrincipalCurvatures principal_curvatures(const SurfaceJet& jet) {
   return k;
 }
 
-double curvature(const BSplineCurve<3>& curve, double t) {
-  const Vec3 d1 = curve.at(t, 1);
+namespace {
+
+// The k-th derivative, or zero where what is left of its terms is their rounding, as it is where
+// control points coincide.
+Vec3 derivative_or_zero(const BSplineCurve<3>& curve, double t, int k) {
+  if (k > curve.knots().degree()) return Vec3::Zero();
+  const BasisValues basis = basis_at(curve.knots(), t, k);
+  Vec3 sum = Vec3::Zero();
+  double terms = 0;
+  for (int j = 0; j < curve.knots().order(); ++j) {
+    const Vec3 term = basis.values(k, j) * curve.control_points().col(basis.first + j);
+    sum += term;
+    terms += term.norm();
+  }
+  constexpr double kRounding = 64 * std::numeric_limits<double>::epsilon();
+  if (sum.norm() <= kRounding * terms) return Vec3::Zero();
+  return sum;
+}
+
+double curvature_of(const Vec3& d1, const Vec3& d2) {
   const double speed = d1.norm();
-  if (!(speed > 0)) return 0;
-  return d1.cross(curve.at(t, 2)).norm() / (speed * speed * speed);
+  return speed > 0 ? d1.cross(d2).norm() / (speed * speed * speed) : 0;
+}
+
+double torsion_of(const Vec3& d1, const Vec3& d2, const Vec3& d3) {
+  const Vec3 binormal = d1.cross(d2);
+  const double squared = binormal.squaredNorm();
+  return squared > 0 ? binormal.dot(d3) / squared : 0;
+}
+
+}  // namespace
+
+double curvature(const BSplineCurve<3>& curve, double t) {
+  return curvature_of(derivative_or_zero(curve, t, 1), derivative_or_zero(curve, t, 2));
 }
 
 double torsion(const BSplineCurve<3>& curve, double t) {
-  const Vec3 binormal = curve.at(t, 1).cross(curve.at(t, 2));
-  const double squared = binormal.squaredNorm();
-  return squared > 0 ? binormal.dot(curve.at(t, 3)) / squared : 0;
+  return torsion_of(derivative_or_zero(curve, t, 1), derivative_or_zero(curve, t, 2),
+                    derivative_or_zero(curve, t, 3));
+}
+
+double curvature(const BSplineCurve<4>& rational, double t) {
+  const Eigen::Matrix3Xd d = rational_derivatives<3>(rational, t, 2);
+  return curvature_of(d.col(1), d.col(2));
+}
+
+double torsion(const BSplineCurve<4>& rational, double t) {
+  const Eigen::Matrix3Xd d = rational_derivatives<3>(rational, t, 3);
+  return torsion_of(d.col(1), d.col(2), d.col(3));
 }
 
 }  // namespace angiospline

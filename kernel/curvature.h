@@ -43,5 +43,7 @@ PrincipalCurvatures principal_curvatures(const SurfaceJet& jet);
 // Curvature |c' x c''| / |c'|^3 (zero where c' is zero) and torsion (zero where curvature is).
 double curvature(const BSplineCurve<3>& curve, double t);
 double torsion(const BSplineCurve<3>& curve, double t);
+double curvature(const BSplineCurve<4>& rational, double t);
+double torsion(const BSplineCurve<4>& rational, double t);
 
 }  // namespace angiospline

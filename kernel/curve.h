@@ -28,8 +28,9 @@ class BSplineCurve {
   const KnotVector& knots() const { return knots_; }
   const ControlPoints& control_points() const { return control_points_; }
 
-  // The k-th derivative at t (k = 0: the point). O(degree^2).
+  // The k-th derivative at t (k = 0: the point), of any order. No allocation. O(degree^2).
   Point at(double t, int k = 0, int span_hint = -1) const {
+    if (k > knots_.degree()) return Point::Zero();
     const BasisValues b = basis_at(knots_, t, k, span_hint);
     return control_points_.middleCols(b.first, knots_.order()) * b.values.row(k).transpose();
   }

@@ -34,18 +34,14 @@ Eigen::Matrix<double, D, Eigen::Dynamic> rational_derivatives(const BSplineCurve
   return C;
 }
 
+namespace {
+
+// The same for surfaces, A and S by column(a, b).
 template <int D>
-Eigen::Matrix<double, D, Eigen::Dynamic> rational_derivatives(const BSplineSurface<D + 1>& surface,
-                                                              double u, double v, int derivatives) {
-  EXPECTS(derivatives >= 0);
-  const int count = column(0, derivatives) + 1;
-  Eigen::Matrix<double, D + 1, Eigen::Dynamic> A(D + 1, count);
-  for (int order = 0; order <= derivatives; ++order) {
-    for (int b = 0; b <= order; ++b) A.col(column(order - b, b)) = surface.at(u, v, order - b, b);
-  }
+void project_partials(const Eigen::Matrix<double, D + 1, Eigen::Dynamic>& A, int derivatives,
+                      Eigen::Matrix<double, D, Eigen::Dynamic>& S) {
   const double w = A(D, 0);
   EXPECTS(w > 0);
-  Eigen::Matrix<double, D, Eigen::Dynamic> S(D, count);
   for (int order = 0; order <= derivatives; ++order) {
     for (int b = 0; b <= order; ++b) {
       const int a = order - b;
@@ -60,7 +56,45 @@ Eigen::Matrix<double, D, Eigen::Dynamic> rational_derivatives(const BSplineSurfa
       S.col(column(a, b)) = rest / w;
     }
   }
+}
+
+}  // namespace
+
+template <int D>
+Eigen::Matrix<double, D, Eigen::Dynamic> rational_derivatives(const BSplineSurface<D + 1>& surface,
+                                                              double u, double v, int derivatives) {
+  EXPECTS(derivatives >= 0);
+  const int count = column(0, derivatives) + 1;
+  Eigen::Matrix<double, D + 1, Eigen::Dynamic> A(D + 1, count);
+  for (int order = 0; order <= derivatives; ++order) {
+    for (int b = 0; b <= order; ++b) A.col(column(order - b, b)) = surface.at(u, v, order - b, b);
+  }
+  Eigen::Matrix<double, D, Eigen::Dynamic> S(D, count);
+  project_partials<D>(A, derivatives, S);
   return S;
+}
+
+template <int D>
+SurfaceGrid<D> projected(const SurfaceGrid<D + 1>& grid) {
+  SurfaceGrid<D> result;
+  result.u_count = grid.u_count;
+  result.v_count = grid.v_count;
+  result.derivatives = grid.derivatives;
+  const Eigen::Index points = grid.points().cols();
+  const Eigen::Index count = static_cast<Eigen::Index>(grid.partials.size());
+  for (Eigen::Index k = 0; k < count; ++k) result.partials.emplace_back(D, points);
+  Eigen::Matrix<double, D + 1, Eigen::Dynamic> A(D + 1, count);
+  Eigen::Matrix<double, D, Eigen::Dynamic> S(D, count);
+  for (Eigen::Index p = 0; p < points; ++p) {
+    for (Eigen::Index k = 0; k < count; ++k) {
+      A.col(k) = grid.partials[static_cast<std::size_t>(k)].col(p);
+    }
+    project_partials<D>(A, grid.derivatives, S);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      result.partials[static_cast<std::size_t>(k)].col(p) = S.col(k);
+    }
+  }
+  return result;
 }
 
 template <int D>
@@ -100,5 +134,7 @@ template Eigen::Matrix<double, 2, Eigen::Dynamic> rational_derivatives<2>(const 
                                                                           double, double, int);
 template Eigen::Matrix<double, 3, Eigen::Dynamic> rational_derivatives<3>(const BSplineSurface<4>&,
                                                                           double, double, int);
+template SurfaceGrid<2> projected<2>(const SurfaceGrid<3>&);
+template SurfaceGrid<3> projected<3>(const SurfaceGrid<4>&);
 
 }  // namespace angiospline

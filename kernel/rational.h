@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "kernel/curve.h"
+#include "kernel/grid.h"
 #include "kernel/surface.h"
 
 namespace angiospline {
@@ -22,6 +23,11 @@ Eigen::Matrix<double, D, Eigen::Dynamic> rational_derivatives(const BSplineCurve
 template <int D>
 Eigen::Matrix<double, D, Eigen::Dynamic> rational_derivatives(const BSplineSurface<D + 1>& surface,
                                                               double u, double v, int derivatives);
+
+// The same for every point of a grid of homogeneous values: all partials it has, projected. D is 2
+// or 3. Requires positive weights there.
+template <int D>
+SurfaceGrid<D> projected(const SurfaceGrid<D + 1>& grid);
 
 // Homogeneous control points from points and weights (all positive), and back.
 template <int D>

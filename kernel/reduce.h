@@ -78,6 +78,17 @@ template <int D>
 Result<ReducedSurface<D>> reduce(const BSplineSurface<D>& surface,
                                  const SurfaceReductionOptions& options);
 
+// The same for rational curves and surfaces, held homogeneous: the tolerance and the bound are on
+// the projected points, what is held are projected derivatives. Requires positive weights; the
+// function of the weights stays positive, single control weights need not. Curves: D 1 to 3.
+// Surfaces: 2, 3.
+template <int D>
+Result<ReducedCurve<D + 1>> reduce_rational(const BSplineCurve<D + 1>& curve,
+                                            ReductionOptions options);
+template <int D>
+Result<ReducedSurface<D + 1>> reduce_rational(const BSplineSurface<D + 1>& surface,
+                                              SurfaceReductionOptions options);
+
 // For each interior knot (index degree + 1 .. control_point_count - 1) the distance, in the largest
 // coefficient, from the spline to those without this copy of the knot (of a multiple one, the
 // lightest copy first, each weighed with the ones before it gone). `stride` numbers a control

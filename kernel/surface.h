@@ -1,6 +1,7 @@
 // Tensor-product B-spline surfaces in 2 to 4 dimensions.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 
 #include <Eigen/Core>
@@ -40,18 +41,19 @@ class BSplineSurface {
   Eigen::Index index(int i, int j) const { return static_cast<Eigen::Index>(i) * v_count() + j; }
   Point control_point(int i, int j) const { return control_points_.col(index(i, j)); }
 
-  // The mixed derivative d^(a+b) S / du^a dv^b at (u, v); a = b = 0: the point. The caller may hold
-  // a hint, the spans of the last call or any others: right ones save the search, and the spans
-  // found are written back. The result does not depend on it. No allocation.
+  // The mixed derivative d^(a+b) S / du^a dv^b at (u, v), of any order; a = b = 0: the point. The
+  // caller may hold a hint, the spans of the last call or any others: right ones save the search,
+  // and the spans found are written back. The result does not depend on it. No allocation.
   Point at(double u, double v, int a = 0, int b = 0) const {
     SpanHint hint;
     return at(u, v, hint, a, b);
   }
   Point at(double u, double v, SpanHint& hint, int a = 0, int b = 0) const {
-    const BasisValues bu = basis_at(u_, u, a, hint.u);
-    const BasisValues bv = basis_at(v_, v, b, hint.v);
+    const BasisValues bu = basis_at(u_, u, std::min(a, u_.degree()), hint.u);
+    const BasisValues bv = basis_at(v_, v, std::min(b, v_.degree()), hint.v);
     hint = {bu.first + u_.degree(), bv.first + v_.degree()};
     Point sum = Point::Zero();
+    if (a > u_.degree() || b > v_.degree()) return sum;
     for (int i = 0; i < u_.order(); ++i) {
       const auto row = control_points_.middleCols(index(bu.first + i, bv.first), v_.order());
       sum += bu.values(a, i) * (row * bv.values.row(b).transpose());

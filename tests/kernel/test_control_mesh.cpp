@@ -135,6 +135,45 @@ TEST(RefineToTolerance, PutsKnotsWhereTheCurveBendsAndBeatsUniformRefinement) {
   EXPECT_LT(3 * ours, uniform) << ours << " against " << uniform;
 }
 
+// A circle bends alike everywhere: nothing to choose, and nothing to lose.
+TEST(RefineToTolerance, NeedsNeverMoreThanCuttingEverySpanAlike) {
+  Random random(6);
+  int equal = 0;
+  for (int round = 0; round < 20; ++round) {
+    const KnotVector knots = round < 6 ? KnotVector::clamped(3 + round % 3, spaced(0, 1, 9))
+                                       : random_knots(random, 2 + random.below(4), 1, false);
+    BSplineCurve<3> curve = random_curve<3>(random, knots);
+    if (round < 6) {
+      Eigen::Matrix3Xd points(3, knots.control_point_count());
+      for (int i = 0; i < points.cols(); ++i) {
+        points.col(i) << std::cos(6 * knots.greville(i)), std::sin(6 * knots.greville(i)), 0;
+      }
+      curve = BSplineCurve<3>(knots, points);
+    }
+    MeshOptions options;
+    options.tolerance = 1e-3;
+    const auto refined = refine_to_tolerance(curve, options);
+    ASSERT_TRUE(refined) << refined.error().message();
+    EXPECT_LE(refined->distance, options.tolerance);
+    const std::vector<double> breaks = knots.breakpoints();
+    for (int k = 1;; ++k) {
+      std::vector<double> added;
+      for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
+        for (int j = 1; j < k; ++j)
+          added.push_back(breaks[i] + (breaks[i + 1] - breaks[i]) * j / k);
+      }
+      const BSplineCurve<3> uniform = *insert_knots(curve, added);
+      if (control_polygon_distance(uniform) > options.tolerance) continue;
+      const int count = uniform.knots().control_point_count();
+      EXPECT_LE(refined->curve.knots().control_point_count(), count);
+      equal += refined->curve.knots().control_point_count() == count ? 1 : 0;
+      break;
+    }
+  }
+  EXPECT_GT(equal, 0);
+  EXPECT_LT(equal, 20);
+}
+
 // Where long spans meet short ones the bound is larger than on either side.
 TEST(RefineToTolerance, EndsWhereTheBoundIsCloseToTheToleranceEverywhere) {
   Random random(5);
