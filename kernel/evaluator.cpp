@@ -1,6 +1,7 @@
 #include "kernel/evaluator.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -239,13 +240,20 @@ void SurfaceEvaluator<D>::evaluate_all(const Eigen::Matrix2Xd& parameters, Surfa
                                        int threads) const {
   EXPECTS(threads >= 1);
   const Eigen::Index count = parameters.cols();
-  const auto part = [&](int k) {
-    const Eigen::Index from = count * k / threads;
-    run_(*this, parameters.data() + 2 * from, count * (k + 1) / threads - from, out + from);
+  // Short runs, taken as threads come free: none waits for another that was started late or held
+  // up. Each point has its place, so who works on it makes no difference.
+  constexpr Eigen::Index kRun = 2048;
+  std::atomic<Eigen::Index> next = 0;
+  const auto work = [&] {
+    for (;;) {
+      const Eigen::Index from = next.fetch_add(kRun, std::memory_order_relaxed);
+      if (from >= count) return;
+      run_(*this, parameters.data() + 2 * from, std::min(kRun, count - from), out + from);
+    }
   };
   std::vector<std::jthread> helpers;
-  for (int k = 1; k < threads; ++k) helpers.emplace_back(part, k);
-  part(0);
+  for (int k = 1; k < threads; ++k) helpers.emplace_back(work);
+  work();
 }
 
 template class SurfaceEvaluator<2>;

@@ -38,9 +38,9 @@ TEST(SurfaceEvaluator, GivesTheSameBitsOnAnyNumberOfThreads) {
   Random random(2);
   const KnotVector knots = KnotVector::clamped(5, {0, 0.1, 0.5, 0.6, 1});
   const SurfaceEvaluator<3> evaluator(random_surface<3>(random, knots, knots));
-  Eigen::Matrix2Xd parameters(2, 1001);
+  Eigen::Matrix2Xd parameters(2, 10001);  // several runs for each thread
   for (Eigen::Index i = 0; i < parameters.size(); ++i) parameters.data()[i] = random.uniform();
-  std::vector<SurfacePartials<3>> one(1001), three(1001);
+  std::vector<SurfacePartials<3>> one(10001), three(10001);
   evaluator.evaluate_all(parameters, one.data(), 1);
   evaluator.evaluate_all(parameters, three.data(), 3);
   for (std::size_t k = 0; k < one.size(); ++k) {

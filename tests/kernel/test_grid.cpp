@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "kernel/fit.h"
 #include "kernel/grid.h"
 #include "tests/kernel/random_splines.h"
 
@@ -43,6 +44,57 @@ TEST(EvaluateGrid, AgreesWithPointwiseEvaluationForAllDegreesAndSizes) {
     expect_pointwise<2>(random, 1 + random.below(5), columns[round % 6]);
     expect_pointwise<3>(random, 1 + random.below(5), columns[round % 6]);
     expect_pointwise<4>(random, 1 + random.below(5), columns[round % 6]);
+  }
+}
+
+// The sums as written down, one term after the other: whatever instructions are used, every bit is
+// that of these.
+TEST(EvaluateGrid, GivesTheBitsOfPlainSums) {
+  Random random(8);
+  for (int degree = 1; degree <= 8; ++degree) {
+    const BSplineSurface<3> surface =
+        random_surface<3>(random, random_knots(random, degree), random_knots(random, degree));
+    const auto us = random_parameters(random, surface.u(), 9);
+    const auto vs = random_parameters(random, surface.v(), 43);
+    const SurfaceGrid<3> grid = evaluate_grid(surface, us, vs, 2);
+    const auto Nu = collocation_matrices(surface.u(), us, 2);
+    const auto Nv = collocation_matrices(surface.v(), vs, 2);
+    for (int a = 0; a <= 2; ++a) {
+      for (int b = 0; a + b <= 2; ++b) {
+        const CompactRows& U = Nu[static_cast<std::size_t>(a)];
+        const CompactRows& V = Nv[static_cast<std::size_t>(b)];
+        for (int i = 0; i < U.rows(); ++i) {
+          for (int j = 0; j < V.rows(); ++j) {
+            Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+            for (int k = 0; k <= degree; ++k) {
+              Eigen::Vector3d along_v = Eigen::Vector3d::Zero();
+              for (int l = 0; l <= degree; ++l) {
+                along_v += V.row(j)[l] * surface.control_point(U.first(i) + k, V.first(j) + l);
+              }
+              sum += U.row(i)[k] * along_v;
+            }
+            ASSERT_EQ(grid.partial(a, b).col(i * V.rows() + j), sum) << "degree " << degree;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(UnitNormals, AreThoseOfThePartials) {
+  Random random(9);
+  const BSplineSurface<3> surface =
+      random_surface<3>(random, KnotVector::clamped(3, {0, 1, 2}), KnotVector::bezier(5));
+  const auto us = spaced(0, 2, 7);
+  const auto vs = spaced(0, 1, 5);
+  const auto normals = unit_normals(evaluate_grid(surface, us, vs, 1));
+  for (int i = 0; i < 7; ++i) {
+    for (int j = 0; j < 5; ++j) {
+      const Eigen::Vector3d wanted =
+          normal_vector(surface, us[static_cast<std::size_t>(i)], vs[static_cast<std::size_t>(j)])
+              .normalized();
+      EXPECT_LT((normals.col(i * 5 + j) - wanted).norm(), 1e-13);
+    }
   }
 }
 

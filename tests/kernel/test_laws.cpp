@@ -213,6 +213,23 @@ TEST(Derivatives, OfSurfacesOfAllDegreesAgreeWithFiniteDifferences) {
   }
 }
 
+// Knots of any multiplicity inserted and taken out again leave the curve as it was.
+TEST(InsertThenRemove, IsTheIdentity) {
+  Random random(9);
+  for (int round = 0; round < 40; ++round) {
+    const KnotVector knots = random_knots(random, 2 + random.below(4), 2, false);
+    const BSplineCurve<3> curve = random_curve<3>(random, knots);
+    const auto fine = insert_knots(curve, random_new_knots(random, knots, 1 + random.below(15)));
+    ASSERT_TRUE(fine);
+    ReductionOptions options;
+    options.tolerance = 1e-9;
+    const auto back = reduce(*fine, options);
+    ASSERT_TRUE(back) << back.error().message();
+    ASSERT_EQ(back->curve.knots(), knots) << "round " << round;
+    EXPECT_LT((back->curve.control_points() - curve.control_points()).cwiseAbs().maxCoeff(), 1e-8);
+  }
+}
+
 TEST(SpanHint, NeverChangesTheValueAndHoldsTheSpansFound) {
   Random random(8);
   for (int round = 0; round < 100; ++round) {

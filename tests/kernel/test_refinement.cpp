@@ -73,6 +73,25 @@ TEST(Refine, ChangesNoPointOfASurfaceInEitherDirection) {
   }
 }
 
+TEST(Refine, ThreeAlgorithmsAgreeOnSurfacesInBothDirections) {
+  Random random(8);
+  for (int round = 0; round < 60; ++round) {
+    const KnotVector u = random_knots(random, 1 + random.below(6));
+    const KnotVector v = random_knots(random, 1 + random.below(6));
+    const KnotVector fine_u = *with_knots(u, random_new_knots(random, u, 11));
+    const KnotVector fine_v = *with_knots(v, random_new_knots(random, v, 8));
+    const BSplineSurface<3> surface = random_surface<3>(random, u, v);
+    const auto by = [&](CompactRows (*matrix)(const KnotVector&, const KnotVector&)) {
+      return transform_v(transform_u(surface, matrix(u, fine_u), fine_u), matrix(v, fine_v), fine_v)
+          .control_points();
+    };
+    const Eigen::Matrix3Xd ours = refine(surface, fine_u, fine_v).control_points();
+    for (const auto matrix : {refinement_matrix, refinement_matrix_oslo, refinement_matrix_boehm}) {
+      EXPECT_LT((by(matrix) - ours).cwiseAbs().maxCoeff(), 64 * kEpsilon);
+    }
+  }
+}
+
 TEST(WithKnots, RefusesAValueOutsideTheDomainAndAMultiplicityAboveTheOrder) {
   const KnotVector knots = KnotVector::clamped(2, {0, 1, 2});
   const auto outside = with_knots(knots, {0.5, 2.5});
