@@ -190,6 +190,34 @@ void grid_with_partials_sisl(benchmark::State& state) {
   count_points(state, 40000);
 }
 BENCHMARK(grid_with_partials_sisl);
+
+// Ours and SISL's in turn. Argument 1: with unit normals, which s1506 always gives.
+void grid_in_turn(benchmark::State& state) {
+  const BSplineSurface<3> surface = sheet();
+  const SislSurface peer = to_sisl(surface);
+  std::vector<double> t = spaced(0, 1, 200);
+  std::vector<double> derivatives(9 * 40000);
+  std::vector<double> peer_normals(3 * 40000);
+  SurfaceGrid<3> grid;
+  Eigen::Matrix3Xd normals;
+  double ratio = 0;
+  for (auto _ : state) {
+    ratio = ratio_in_turn(
+        [&] {
+          grid = evaluate_grid(surface, t, t, 1, std::move(grid));
+          if (state.range(0) != 0) normals = unit_normals(grid, std::move(normals));
+          benchmark::ClobberMemory();
+        },
+        [&] {
+          int status = 0;
+          s1506(peer.get(), 1, 200, t.data(), 200, t.data(), derivatives.data(),
+                peer_normals.data(), &status);
+          benchmark::ClobberMemory();
+        });
+  }
+  state.counters["ratio"] = ratio;
+}
+BENCHMARK(grid_in_turn)->Arg(0)->Arg(1)->Iterations(1);
 #endif
 
 }  // namespace

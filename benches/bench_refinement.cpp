@@ -1,3 +1,4 @@
+#include <cmath>
 #include <vector>
 
 #include "benches/kernel_samples.h"
@@ -6,6 +7,7 @@
 #include <TColStd_Array1OfReal.hxx>
 #include <benchmark/benchmark.h>
 
+#include "kernel/control_mesh.h"
 #include "kernel/fit.h"
 #include "kernel/grid.h"
 #include "kernel/refinement.h"
@@ -52,6 +54,69 @@ void insert_100_knots_surface(benchmark::State& state) {
   }
 }
 BENCHMARK(insert_100_knots_surface)->Unit(benchmark::kMicrosecond);
+
+// Every span in k pieces, the least k at which the bound is within the tolerance: what refinement
+// that does not choose its places would need.
+std::vector<double> cut_breaks(const std::vector<double>& breaks, int pieces) {
+  std::vector<double> cut;
+  for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
+    for (int k = 0; k < pieces; ++k) {
+      cut.push_back(breaks[i] + (breaks[i + 1] - breaks[i]) * k / pieces);
+    }
+  }
+  cut.push_back(breaks.back());
+  return cut;
+}
+
+// A line with one sharp bend; argument: minus the decimal logarithm of the tolerance.
+void control_polygon_of_a_bend(benchmark::State& state) {
+  const KnotVector knots = uniform_knots(5, 37);
+  const auto nodes = knots.greville();
+  Eigen::Matrix3Xd points(3, 37);
+  for (int i = 0; i < 37; ++i) {
+    const double t = nodes[static_cast<std::size_t>(i)];
+    points.col(i) << 10 * t, 2 * std::tanh(40 * (t - 0.3)), 0;
+  }
+  const BSplineCurve<3> curve(knots, points);
+  MeshOptions options;
+  options.tolerance = std::pow(10.0, -static_cast<double>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(refine_to_tolerance(curve, options));
+  state.counters["control_points"] =
+      refine_to_tolerance(curve, options)->curve.knots().control_point_count();
+  for (int pieces = 1;; ++pieces) {
+    const KnotVector fine = KnotVector::clamped(5, cut_breaks(knots.breakpoints(), pieces));
+    if (control_polygon_distance(rewrite(curve, fine)) > options.tolerance) continue;
+    state.counters["uniform"] = fine.control_point_count();
+    break;
+  }
+}
+BENCHMARK(control_polygon_of_a_bend)->Arg(2)->Arg(3)->Arg(4)->Unit(benchmark::kMicrosecond);
+
+// The tube, with a sharp bulge in the middle; pieces of uniform refinement are shared by both
+// directions in the ratio that serves it best.
+void control_mesh_of_a_bulge(benchmark::State& state) {
+  const BSplineSurface<3> straight = tube(40, 16);
+  Eigen::Matrix3Xd net = straight.control_points();
+  for (int j = 0; j < straight.v_count(); ++j) net.col(straight.index(20, j)) *= 1.05;
+  const BSplineSurface<3> surface(straight.u(), straight.v(), net);
+  MeshOptions options;
+  options.tolerance = std::pow(10.0, -static_cast<double>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(refine_to_tolerance(surface, options));
+  state.counters["control_points"] =
+      static_cast<double>(refine_to_tolerance(surface, options)->surface.control_points().cols());
+  double uniform = 1e9;
+  for (int across = 1; across <= 24; ++across) {
+    const KnotVector v = KnotVector::clamped(5, cut_breaks(surface.v().breakpoints(), across));
+    for (int along = 1; along <= 24; ++along) {
+      const KnotVector u = KnotVector::clamped(5, cut_breaks(surface.u().breakpoints(), along));
+      const double count = 1.0 * u.control_point_count() * v.control_point_count();
+      if (count >= uniform) break;
+      if (control_mesh_distance(refine(surface, u, v)) <= options.tolerance) uniform = count;
+    }
+  }
+  state.counters["uniform"] = uniform;
+}
+BENCHMARK(control_mesh_of_a_bulge)->Arg(1)->Unit(benchmark::kMillisecond);
 
 // Linear in size: n, 10 n, 100 n control points, every span halved; and least squares.
 void halve_all_spans(benchmark::State& state) {

@@ -1,6 +1,8 @@
 #include "benches/kernel_samples.h"
 
+#include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <numbers>
 
 #include <Eigen/Geometry>
@@ -8,6 +10,7 @@
 #include "base/random.h"
 #include "kernel/fit.h"
 #include "kernel/grid.h"
+#include "kernel/periodic.h"
 
 namespace angiospline::bench {
 namespace {
@@ -84,6 +87,28 @@ BSplineSurface<3> tube(int along, int around) {
   return interpolate_at_greville<3>(u, v, points);
 }
 
+BSplineSurface<3> ring(int along, int around) {
+  const auto closed_knots = [](int count) {
+    std::vector<Knot> period;
+    for (int k = 0; k < count; ++k) period.push_back({1.0 * k / count, 1});
+    return *periodic_knots(5, period, 1);
+  };
+  std::vector<double> us, vs;
+  for (int i = 0; i < 4 * along; ++i) us.push_back(i / (4.0 * along));
+  for (int j = 0; j < 4 * around; ++j) vs.push_back(j / (4.0 * around));
+  Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(us.size() * vs.size()));
+  Eigen::Index column = 0;
+  for (const double u : us) {
+    for (const double v : vs) {
+      const double a = kTurn * u;
+      const double b = kTurn * v;
+      const double r = 10 + (2 + 0.2 * std::cos(3 * a)) * std::cos(b);
+      points.col(column++) << r * std::cos(a), r * std::sin(a), 2 * std::sin(b);
+    }
+  }
+  return *fit_periodic<3>(closed_knots(along), closed_knots(around), us, vs, points);
+}
+
 double largest_distance(const BSplineCurve<3>& a, const BSplineCurve<3>& b) {
   const auto t = spaced(0, 1, 40001);
   return (evaluate(a, t) - evaluate(b, t)).colwise().norm().maxCoeff();
@@ -96,6 +121,30 @@ double largest_distance(const BSplineSurface<3>& a, const BSplineSurface<3>& b) 
       .colwise()
       .norm()
       .maxCoeff();
+}
+
+double ratio_in_turn(const std::function<void()>& ours, const std::function<void()>& theirs) {
+  constexpr int kTurns = 21;
+  const auto seconds = [](const std::function<void()>& work) {
+    const auto now = [] {
+      timespec t;
+      clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+      return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+    };
+    const double start = now();
+    work();
+    return now() - start;
+  };
+  std::vector<double> a, b;
+  for (int turn = 0; turn < kTurns; ++turn) {
+    a.push_back(seconds(ours));
+    b.push_back(seconds(theirs));
+  }
+  const auto median = [](std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + kTurns / 2, values.end());
+    return values[kTurns / 2];
+  };
+  return median(a) / median(b);
 }
 
 std::vector<double> u_fastest(const BSplineSurface<3>& surface) {

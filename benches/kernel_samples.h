@@ -1,6 +1,7 @@
 // The inputs that the kernel's benchmarks share, ours and the peers'.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -25,9 +26,16 @@ BSplineCurve<3> helix(int count, double noise);
 // A bent tube of varying radius, bi-quintic, u along it.
 BSplineSurface<3> tube(int along, int around);
 
+// A torus of wavy radius, bi-quintic, closed in both directions, over [0, 1] x [0, 1].
+BSplineSurface<3> ring(int along, int around);
+
 // The largest distance at equal parameters, densely sampled.
 double largest_distance(const BSplineCurve<3>& a, const BSplineCurve<3>& b);
 double largest_distance(const BSplineSurface<3>& a, const BSplineSurface<3>& b);
+
+// The time of `ours` over that of `theirs`, CPU time, the two run in turn until each has had some
+// 20 turns: what slows the machine down for a while slows both. Medians.
+double ratio_in_turn(const std::function<void()>& ours, const std::function<void()>& theirs);
 
 // The net with i running fastest, as SISL wants it.
 std::vector<double> u_fastest(const BSplineSurface<3>& surface);
