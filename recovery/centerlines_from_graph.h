@@ -23,7 +23,7 @@ struct CenterlineOptions {
   // Wavelength along the branch that is halved in amplitude: this many radii, at least so many
   // voxels.
   double smoothing_radii = 2.0;
-  double smoothing_voxels = 8.0;
+  double smoothing_voxels = 6.0;
   // No point moves farther from the axis of voxels than this many local radii, or one voxel's
   // diagonal.
   double largest_move_radii = 0.5;
@@ -33,8 +33,9 @@ struct CenterlineOptions {
 // every voxel. Points lie in the middle of the lumen at sub-voxel accuracy: each is moved to the
 // centre of its cross-section where that is closed, and the whole is smoothed by a least-squares
 // spline (second differences along branches) which bridges the sections that open into a junction.
-// Radii are those of circles of the section's area; within a junction's lumen a branch keeps the
-// radius it has outside. Tails of the axis that bend into an end's corner are cut and the tip is
+// Radii are those of circles of the section's area, corrected along each branch so that they keep
+// the volume of the mask's voxels; within a junction's lumen a branch keeps the radius it has
+// outside. Tails of the axis that bend into an end's corner are cut and the tip is
 // set by `tips`. Inlets are the roots of the graph's components that are ends. Names: node
 // "v<x>_<y>_<z>" by its voxel; a branch by the node at its far end from the root, with
 // "_2", "_3" where several lead there. Components of one voxel become no branch and are left out,

@@ -65,6 +65,35 @@ TEST(VesselsFromMask, measure_tubes_of_any_width_and_direction) {
     }
 }
 
+// Slices three times as thick as the pixels, a vessel no thicker than two of them included.
+TEST(VesselsFromMask, keep_radius_and_centre_of_tubes_in_thick_slices) {
+  Random random(12);
+  for (const double radius : {3.0, 5.0}) {
+    double width = 0.0;
+    double off_vox = 0.0;
+    int points = 0;
+    for (int i = 0; i < 6; ++i) {
+      const Vec3 axis = Vec3(random.gaussian(), random.gaussian(), random.gaussian()).normalized();
+      const Vec3 center(45.0 + random.uniform(), 45.0 + random.uniform(), 45.0 + random.uniform());
+      Mask mask = empty_mask({92, 92, 30}, Vec3(1, 1, 3));
+      test::add_tube(mask, center - 27.0 * axis, center + 27.0 * axis, radius, test::Ends::kFlat);
+      const CenterlineTree tree = vessels_from_mask(mask).value().tree;
+      ASSERT_EQ(tree.branches.size(), 1U) << radius;
+      const CenterlineBranch& branch = tree.branches[0];
+      for (Eigen::Index k = 0; k < branch.points_mm.cols(); ++k) {
+        const Vec3 d = branch.points_mm.col(k) - center;
+        const Vec3 across = d - d.dot(axis) * axis;
+        off_vox += across.cwiseQuotient(mask.grid.spacing_mm).norm();
+        width += branch.radii_mm[k] / radius;
+        ++points;
+      }
+    }
+    EXPECT_GT(points, 200);
+    EXPECT_NEAR(width / points, 1.0, 0.03) << radius;
+    EXPECT_LT(off_vox / points, 0.3) << radius;
+  }
+}
+
 TEST(VesselsFromMask, honour_spacing_origin_and_direction) {
   Mask mask = empty_mask({120, 100, 40}, Vec3(1, 1, 3));
   mask.grid.direction << 0.8, 0.6, 0, -0.6, 0.8, 0, 0, 0, 1;
