@@ -44,6 +44,23 @@ void flatten_rims(SurfaceNetwork& network) {
   }
 }
 
+// The point of the surface that each pool column stands for: at its Greville parameters. Control
+// points themselves stand off a curved wall, by more than edges are wrong.
+Points3 points_of_columns(const SurfaceNetwork& network) {
+  Points3 points = network.control_points_mm;
+  for (std::size_t p = 0; p < network.patches.size(); ++p) {
+    const Patch& patch = network.patches[p];
+    const BSplineSurface<3> surface = patch_surface(network, static_cast<int>(p));
+    const std::vector<double> us = patch.u.greville(), vs = patch.v.greville();
+    for (std::size_t i = 0; i < us.size(); ++i) {
+      for (std::size_t j = 0; j < vs.size(); ++j) {
+        points.col(patch.control[i * vs.size() + j]) = surface.at(us[i], vs[j]);
+      }
+    }
+  }
+  return points;
+}
+
 // Pool columns of the refined network are the mesh's nodes.
 std::vector<PartFigures> figures_of_parts(const SurfaceNetwork& fine, const Points3& moves,
                                           const Eigen::VectorXd& forces) {
@@ -84,7 +101,8 @@ Result<DeformedModel> deform_model(const Model& model, const Image<float>& image
   fineness.least_pieces = options.pieces;
   auto fine = refine_network(model.network, fineness);
   if (!fine) return fail(fine.error());
-  const DeformMesh start = control_mesh(fine->network);
+  DeformMesh start = control_mesh(fine->network);
+  start.nodes_mm = points_of_columns(fine->network);
   const double voxel = std::cbrt(image.grid.spacing_mm.prod());
   DeformOptions how =
       steady_options(options.method, start, options.potential, options.strength, options.reach_vox);
@@ -101,7 +119,7 @@ Result<DeformedModel> deform_model(const Model& model, const Image<float>& image
   result.residual_force = residual_field(deformed->report, result.mesh);
   result.parts = figures_of_parts(fine->network, deformed->mesh.nodes_mm - start.nodes_mm,
                                   deformed->report.residual_force);
-  fine->network.control_points_mm = deformed->mesh.nodes_mm;
+  fine->network.control_points_mm += deformed->mesh.nodes_mm - start.nodes_mm;
   RefinedNetwork coarse = coarsen_network(fine->network, model.network);
   result.coarsening_mm = coarse.distance_mm;
   result.report = std::move(deformed->report);

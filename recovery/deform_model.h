@@ -42,11 +42,11 @@ struct DeformedModel {
       parts;  // residual forces and moves of the nodes of each region, and of all
 };
 
-// The model's network is refined to a finite-element mesh, deformed among the image's edges
-// (recovery/deform_solver.h), brought back to its own knots and made tangent-plane continuous again
-// with floating boundaries; ends are brought back to their planes. Junctions that cannot be made
-// smooth are named in the model's warnings. Errors: those of find_edges, refine_network, deform;
-// the model lies outside the image; kCancelled.
+// The model's network is refined to a finite-element mesh (of points of its surface), deformed
+// among the image's edges (recovery/deform_solver.h), brought back to its own knots and made
+// tangent-plane continuous again with floating boundaries; ends are brought back to their planes.
+// Junctions that cannot be made smooth are named in the model's warnings. Errors: those of
+// find_edges, refine_network, deform; the model lies outside the image; kCancelled.
 Result<DeformedModel> deform_model(const Model& model, const Image<float>& image,
                                    const DeformModelOptions& options = {},
                                    const Progress& progress = {});
