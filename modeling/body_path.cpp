@@ -18,9 +18,14 @@ namespace {
 constexpr int kDegree = 5;
 constexpr double kSlack = 1e-4;  // bending stiffness where nothing asks for more
 constexpr double kStiff = 4.0;   // near held ends: a turn by delta bends by about delta / radius
+constexpr double kSlackRadius =
+    1e-3;  // a slope of the radius that is missing there dies out at once
 constexpr double kFirstStep = 0.0125;
 constexpr int kRounds = 24;  // of stiffening bends that are too tight
+constexpr int kNarrowings = 4;
+constexpr double kNarrowerBend = 0.6;
 constexpr double kSpansPerRadius = 1.5;
+constexpr double kFinest = 0.33;      // of the mean radius
 constexpr double kNearEnd = 5.0;      // radii within which a bend is the end's
 constexpr double kLeadBend = 0.65;    // that a lead-in should keep, so that the fit to it has room
 constexpr double kNearTarget = 10.0;  // radii of way within which a point finds its place again
@@ -168,7 +173,10 @@ class PathFit {
     problem.bending = scaled(stiffness_, stretch, kStiff);
     problem.first = first - target.topRows(first.rows());
     problem.last = last - target.bottomRows(last.rows());
-    return BSplineCurve<4>(knots_, (target + fit_spline(knots_, problem)).transpose());
+    Eigen::MatrixXd correction = fit_spline(knots_, problem);
+    problem.bending = scaled(slack(), stretch, kSlackRadius);
+    correction.col(3) = fit_spline(knots_, problem).col(3);
+    return BSplineCurve<4>(knots_, (target + correction).transpose());
   }
 
   // Bends at the ends and quarters of every span; the tightest one of a span stiffens it and its
@@ -214,6 +222,8 @@ class PathFit {
     course_ = solve();
   }
 
+  std::vector<double> slack() const { return std::vector<double>(stiffness_.size(), kSlack); }
+
   // The target as it is, stiffened where bends ask for it, and free at its ends.
   SplineFitProblem target_problem() const {
     SplineFitProblem problem;
@@ -225,8 +235,14 @@ class PathFit {
     problem.bending = scaled(stiffness_, stretch, kSlack);
     return problem;
   }
+  // Bends are stiffened, radii are not.
   BSplineCurve<4> target_spline() const {
-    return BSplineCurve<4>(knots_, fit_spline(knots_, target_problem()).transpose());
+    SplineFitProblem problem = target_problem();
+    Eigen::MatrixXd fitted = fit_spline(knots_, problem);
+    problem.bending = scaled(slack(), rail_.mean_radius_mm / rail_.length_mm, kSlack);
+    problem.values = problem.values.rightCols<1>().eval();
+    fitted.col(3) = fit_spline(knots_, problem).col(0);
+    return BSplineCurve<4>(knots_, fitted.transpose());
   }
 
   double tightest_within(double from, double to) const {
@@ -254,7 +270,10 @@ class PathFit {
   }
 
   KnotVector make_knots() const {
-    const double radii = rail_.length_mm / rail_.mean_radius_mm;
+    // As fine as the thinnest place asks: a stenosis is as short as it is narrow.
+    const double thinnest =
+        std::max(rail_.points.row(3).minCoeff(), kFinest * rail_.mean_radius_mm);
+    const double radii = rail_.length_mm / thinnest;
     const int spans = std::max(2, static_cast<int>(std::ceil(kSpansPerRadius * radii)));
     std::vector<double> breaks;
     for (int s = 0; s <= spans; ++s) breaks.push_back(static_cast<double>(s) / spans);
@@ -282,12 +301,13 @@ class PathFit {
 };
 
 // Lowers radius control points where the bend is too tight for the radius.
-BSplineCurve<4> narrow(const BSplineCurve<4>& curve, const std::vector<Bend>& bends) {
+BSplineCurve<4> narrow(const BSplineCurve<4>& curve, const std::vector<Bend>& bends,
+                       double tightest) {
   Eigen::Matrix4Xd points = curve.control_points();
   const KnotVector& knots = curve.knots();
   for (const Bend& bend : bends) {
-    if (bend.curvature * bend.radius <= kTightestBend) continue;
-    const double factor = kTightestBend / (bend.curvature * bend.radius);
+    if (bend.curvature * bend.radius <= tightest) continue;
+    const double factor = tightest / (bend.curvature * bend.radius);
     const int first = knots.span(bend.parameter) - knots.degree();
     // The ends' own radii are their neighbours' too.
     for (int i = std::max(first, 2); i <= first + knots.degree() && i < points.cols() - 2; ++i) {
@@ -322,7 +342,8 @@ struct Leave {
 
 constexpr Leave kAnyMove{false, std::numeric_limits<double>::infinity()};
 
-Attempt fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end, const Leave& leave) {
+Attempt fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end, const Leave& leave,
+                   double tightest_bend) {
   PathFit fit(rail, start, end, leave.largest_move);
   if (leave.lead_in) fit.lead_in();
   BSplineCurve<4> curve = fit.course();
@@ -332,12 +353,16 @@ Attempt fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end, c
   std::vector<Bend> bends = bends_of(curve, samples);
   Attempt attempt{{curve, tightest(bends), 0.0}, fit.departure(curve).radii / kLargestDeparture};
   BodyPath& path = attempt.path;
-  if (path.largest_bend <= kTightestBend) return attempt;
-  path.curve = narrow(curve, bends);
-  for (const Bend& before : bends) {
-    path.narrowed = std::max(path.narrowed, 1 - path.curve.at(before.parameter)(3) / before.radius);
+  if (path.largest_bend <= tightest_bend) return attempt;
+  const std::vector<Bend> before = bends;
+  for (int round = 0; round < kNarrowings && tightest(bends) > tightest_bend; ++round) {
+    path.curve = narrow(path.curve, bends, tightest_bend);
+    bends = bends_of(path.curve, samples);
   }
-  path.largest_bend = tightest(bends_of(path.curve, samples));
+  for (const Bend& bend : before) {
+    path.narrowed = std::max(path.narrowed, 1 - path.curve.at(bend.parameter)(3) / bend.radius);
+  }
+  path.largest_bend = tightest(bends);
   attempt.cost = std::max(attempt.cost, path.narrowed / kMostNarrowed);
   if (path.narrowed > kThroat && !std::isinf(leave.largest_move)) attempt.cost += kFoldCost;
   return attempt;
@@ -354,7 +379,8 @@ BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, con
   for (const Leave& leave : {Leave{false, kLargestPathMove}, Leave{false, 1.0},
                              Leave{true, kLargestPathMove}, Leave{true, 1.0}, kAnyMove}) {
     if (freedom == PathFreedom::kAnyMove && !std::isinf(leave.largest_move)) continue;
-    Attempt attempt = fit_within(rail, start, end, leave);
+    Attempt attempt = fit_within(rail, start, end, leave,
+                                 freedom == PathFreedom::kNarrower ? kNarrowerBend : kTightestBend);
     if (!best || attempt.cost < best->cost) best = std::move(attempt);
     if (best->cost <= 1) break;
   }

@@ -22,8 +22,9 @@ struct BodyPath {
   double narrowed = 0.0;      // largest part of the radius given up so that a bend does not fold
 };
 
-// Bends tighter than this (curvature times radius) are relaxed; 1 is where a tube folds.
-inline constexpr double kTightestBend = 0.75;
+// Bends tighter than this (curvature times radius) are relaxed; 1 is where a tube folds. Smoothing
+// keeps to 0.8, so that a smoothed path is followed as it is.
+inline constexpr double kTightestBend = 0.81;
 
 // Stiffening may move the path by so many radii. If that would narrow the radius by more than the
 // share below, or leave the target by more than two radii, other ways are tried (one radius, then
@@ -37,8 +38,9 @@ inline constexpr double kMostNarrowed = 0.4;
 // an end's direction too sharply even so, it is joined farther on (modeling/lead_in.h). If a bend
 // stays too tight the radius is narrowed there to kTightestBend / curvature.
 // Linear in the number of columns and in length / radius.
-// kAnyMove: only the last of these ways, for a wall that folds on every path nearer to the target.
-enum class PathFreedom { kNearTarget, kAnyMove };
+// For a wall that folds on the path that was chosen so: kNarrower gives more of the radius way in
+// tight bends; kAnyMove takes the last of these ways only.
+enum class PathFreedom { kNearTarget, kNarrower, kAnyMove };
 BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, const PathEnd& end,
                        PathFreedom freedom = PathFreedom::kNearTarget);
 

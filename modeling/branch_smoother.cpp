@@ -34,17 +34,18 @@ constexpr int kRadiusTrials = 24;  // of ever weaker smoothing
 constexpr int kRounds = 30;            // of stiffening sharp bends
 constexpr int kAlternations = 12;      // between spline and largest move, in each round
 constexpr double kInsideLimit = 0.95;  // of the largest move: what alternation leaves over is less
-constexpr double kHiddenBends = 0.5;   // what a bend inside a junction counts
+constexpr double kHiddenBends = 0.75;  // what a bend inside a junction counts
 constexpr double kMoveBroken = 1e9;    // what a broken move limit counts against bends
 constexpr double kLeastSpeed = 0.5;    // of the spline in its parameter, a length of chords
-constexpr int kPatience = 3;           // rounds before a strength gives in to the largest move
+constexpr int kReparametrisations = 5;
+constexpr int kPatience = 3;         // rounds before a strength gives in to the largest move
+constexpr double kLeastShare = 0.1;  // of its old way that a sample keeps to the one before it
 constexpr double kMostStiffness = 1e4;
 constexpr double kMostForce = 1e4;
-constexpr int kDenseSamples = 12;     // of the final path, for each span of the smoothing spline
-constexpr int kRefinements = 12;      // halvings of the final path's spans
-constexpr int kBendSamples = 8;       // of curvature, for each span
-constexpr double kRoomInBends = 0.9;  // curvature times radius a radius is reduced to
-constexpr double kLeastFactor = 0.5;  // radii are not reduced below this part of themselves
+constexpr int kDenseSamples = 12;      // of the final path, for each span of the smoothing spline
+constexpr int kRefinements = 12;       // halvings of the final path's spans
+constexpr int kBendSamples = 8;        // of curvature, for each span
+constexpr double kLeastFactor = 0.35;  // radii are not reduced below this part of themselves
 
 struct Samples {
   Eigen::MatrixXd points;  // one row a sample
@@ -163,6 +164,12 @@ double best_grid_position(const Eigen::VectorXd& criteria) {
   return parabola_vertex(criteria, least);
 }
 
+// A path's coefficients and by how much it breaks the rules: 0 if it keeps them.
+struct Followed {
+  Eigen::MatrixXd coefficients;
+  double excess = 0.0;
+};
+
 struct BranchSmoother::State {
   State(const CenterlineBranch& branch, const BranchEnd& start_end, const BranchEnd& end_end,
         double tree_radius, const BranchSmootherOptions& opts)
@@ -207,12 +214,12 @@ struct BranchSmoother::State {
   }
 
   // Weakens the smoothing of the radii until none changes too much.
-  Eigen::MatrixXd smooth_log_radius(double radius_strength) const {
+  Eigen::MatrixXd smooth_log_radius(double strength) const {
     const Eigen::VectorXd y = samples.radii.array().log();
     const Eigen::Index last = y.size() - 1;
     Eigen::MatrixXd C;
-    for (int trial = 0; trial < kRadiusTrials; ++trial, radius_strength *= 0.5) {
-      C = log_radius.solve(radius_strength);
+    for (int trial = 0; trial < kRadiusTrials; ++trial, strength *= 0.5) {
+      C = log_radius.solve(strength);
       const Eigen::VectorXd change = (log_radius.values_at_samples(C).col(0) - y).cwiseAbs();
       bool kept = true;
       for (Eigen::Index i = 0; i <= last && kept; ++i) {
@@ -234,7 +241,8 @@ struct BranchSmoother::State {
   double reduce_radius_in_bends(DensePath& path) const;
   BSplineCurve<4> compressed(const DensePath& path) const;
   Eigen::VectorXd bends_of_spans(const Eigen::MatrixXd& C) const;
-  Eigen::MatrixXd follow_rules(const Eigen::MatrixXd& ends) const;
+  Followed follow_rules(const Eigen::MatrixXd& ends) const;
+  State reparametrised(const Eigen::MatrixXd& C) const;
 
   BranchSmootherOptions options;
   BranchEnd start;
@@ -248,6 +256,7 @@ struct BranchSmoother::State {
   Eigen::VectorXd position_criteria;
   Eigen::VectorXd radius_criteria;
   double position_strength = 0;
+  double radius_strength = 0;
   Eigen::MatrixXd log_radius_coefficients;
 };
 
@@ -280,8 +289,8 @@ double BranchSmoother::State::reduce_radius_in_bends(DensePath& path) const {
   const Eigen::Index count = path.s.size();
   Eigen::VectorXd factor = Eigen::VectorXd::Ones(count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    if (path.bends(k) <= 1.0 || path.bends(k) * kLeastFactor > kRoomInBends) continue;
-    const double least = kRoomInBends / path.bends(k);
+    if (path.bends(k) <= options.largest_bend) continue;
+    const double least = std::max(kLeastFactor, options.largest_bend / path.bends(k));
     const double reach = 2 * path.values(k, 3);
     for (const Eigen::Index step : {Eigen::Index{-1}, Eigen::Index{1}}) {
       for (Eigen::Index j = k; j >= 0 && j < count; j += step) {
@@ -360,7 +369,7 @@ Eigen::VectorXd BranchSmoother::State::bends_of_spans(const Eigen::MatrixXd& C) 
 // keep the largest move, found by the alternating direction method of multipliers: Q are the
 // samples' places inside their balls, U the scaled multipliers (Boyd et al. 2011, Found. Trends
 // Mach. Learn. 3).
-Eigen::MatrixXd BranchSmoother::State::follow_rules(const Eigen::MatrixXd& ends) const {
+Followed BranchSmoother::State::follow_rules(const Eigen::MatrixXd& ends) const {
   PenalisedSpline spline = position;
   const Eigen::MatrixXd& P = samples.points;
   const Eigen::VectorXd& W = samples.weights;
@@ -383,7 +392,7 @@ Eigen::MatrixXd BranchSmoother::State::follow_rules(const Eigen::MatrixXd& ends)
     return excess <= 0;
   };
   Eigen::VectorXd bends = bends_of_spans(C);
-  if (judge(bends)) return best;
+  if (judge(bends)) return {best, 0.0};
   Eigen::MatrixXd F = spline.values_at_samples(C);
   Eigen::MatrixXd U = Eigen::MatrixXd::Zero(P.rows(), 3);
   Eigen::VectorXd rho = Eigen::VectorXd::Zero(P.rows());
@@ -429,7 +438,31 @@ Eigen::MatrixXd BranchSmoother::State::follow_rules(const Eigen::MatrixXd& ends)
       }
     }
   }
-  return best;
+  return {best, best_excess};
+}
+
+// The same samples at the arc lengths where the curve has them. Where the points turn back, the
+// curve is shorter than the way through them: it then runs slowly through the bend, which makes it
+// sharper than its stiffness knows.
+BranchSmoother::State BranchSmoother::State::reparametrised(const Eigen::MatrixXd& C) const {
+  const BSplineCurve<3> curve(knots, C.transpose());
+  State again = *this;
+  Eigen::VectorXd& t = again.samples.parameters;
+  for (Eigen::Index i = 1; i < t.size(); ++i) {
+    constexpr int kSteps = 8;
+    const double from = samples.parameters(i - 1);
+    const double step = (samples.parameters(i) - from) / kSteps;
+    double length = 0;
+    for (int k = 0; k < kSteps; ++k) length += step * curve.at(from + (k + 0.5) * step, 1).norm();
+    // No two samples in one place: that would be a spline without a parameter between them.
+    t(i) = t(i - 1) + std::max(length, kLeastShare * kSteps * step);
+  }
+  again.knots = KnotVector::clamped(kDegree, uniform(t(t.size() - 1), span_count(again.samples)));
+  again.position = PenalisedSpline(again.knots, t, samples.points, samples.weights);
+  again.log_radius =
+      PenalisedSpline(again.knots, t, samples.radii.array().log().matrix(), samples.radius_weights);
+  again.log_radius_coefficients = again.smooth_log_radius(radius_strength);
+  return again;
 }
 
 BranchSmoother::BranchSmoother(const CenterlineBranch& branch, const BranchEnd& start,
@@ -453,8 +486,9 @@ void BranchSmoother::choose_strengths(double position_of_tree, double radius_of_
   State& s = *state_;
   s.position_strength = State::strength(
       s.position_unit, State::drawn_to(position_of_tree, kPositionPrior, s.position_criteria));
-  s.log_radius_coefficients = s.smooth_log_radius(State::strength(
-      s.radius_unit, State::drawn_to(radius_of_tree, kRadiusPrior, s.radius_criteria)));
+  s.radius_strength = State::strength(
+      s.radius_unit, State::drawn_to(radius_of_tree, kRadiusPrior, s.radius_criteria));
+  s.log_radius_coefficients = s.smooth_log_radius(s.radius_strength);
 }
 
 CondensedEnds BranchSmoother::condensed_ends() const {
@@ -466,15 +500,26 @@ SmoothPath BranchSmoother::smooth(const Vec3& start, const Vec3& end) const {
   Eigen::MatrixXd ends(2, 3);
   ends.row(0) = start.transpose();
   ends.row(1) = end.transpose();
-  const Eigen::MatrixXd C = state_->follow_rules(ends);
-  DensePath dense = state_->dense(C);
-  const double factor = state_->reduce_radius_in_bends(dense);
-  const Samples& samples = state_->samples;
-  const Eigen::VectorXd moves = (state_->position.values_at_samples(C) - samples.points)
-                                    .rowwise()
-                                    .norm()
-                                    .cwiseProduct(samples.weights.cwiseSign());
-  return SmoothPath{state_->compressed(dense), moves.maxCoeff(),
+  Followed best = state_->follow_rules(ends);
+  State state = *state_;
+  Followed now = best;
+  State tried = state;
+  for (int k = 0; k < kReparametrisations && best.excess > 0; ++k) {
+    tried = tried.reparametrised(now.coefficients);
+    now = tried.follow_rules(ends);
+    if (now.excess >= best.excess) continue;
+    best = now;
+    state = tried;
+  }
+  DensePath dense = state.dense(best.coefficients);
+  const double factor = state.reduce_radius_in_bends(dense);
+  const Samples& samples = state.samples;
+  const Eigen::VectorXd moves =
+      (state.position.values_at_samples(best.coefficients) - samples.points)
+          .rowwise()
+          .norm()
+          .cwiseProduct(samples.weights.cwiseSign());
+  return SmoothPath{state.compressed(dense), moves.maxCoeff(),
                     moves.cwiseQuotient(samples.radii).maxCoeff(), dense.bends.maxCoeff(), factor};
 }
 

@@ -13,6 +13,13 @@ namespace {
 // Points closer than this, in local radii, are one point: below any quantisation, above rounding.
 constexpr double kSamePoint = 1e-6;
 
+// Points of which so many may have been traced in the wrong order, within so many radii of way; and
+// by how much the right order must shorten it.
+constexpr Eigen::Index kMostReversed = 4;
+constexpr double kReversedWay = 6.0;
+constexpr double kWorthReversing = 0.97;
+constexpr int kReversalPasses = 4;
+
 // Spurs that appear when others go are looked for this often; what then remains stays.
 constexpr int kSpurPasses = 8;
 
@@ -33,6 +40,40 @@ void drop_repeated_points(CenterlineBranch& branch) {
   }
   branch.points_mm.conservativeResize(3, kept);
   branch.radii_mm.conservativeResize(kept);
+}
+
+// Where the course turns back twice within a few radii, the points between are put in the opposite
+// order if that shortens the way: a tracer or a rounding exchanged them. A hairpin stays, for its
+// legs are longer the other way round. Returns how many were put in order.
+int put_in_order(CenterlineBranch& branch) {
+  Points3& p = branch.points_mm;
+  const Eigen::Index count = p.cols();
+  const auto turns_back = [&](Eigen::Index i) {
+    return (p.col(i) - p.col(i - 1)).dot(p.col(i + 1) - p.col(i)) < 0;
+  };
+  const auto step = [&](Eigen::Index i, Eigen::Index j) { return (p.col(j) - p.col(i)).norm(); };
+  int reversed = 0;
+  for (int pass = 0; pass < kReversalPasses; ++pass) {
+    const int before = reversed;
+    for (Eigen::Index i = 1; i + 2 < count; ++i) {
+      if (!turns_back(i)) continue;
+      double way = 0;
+      for (Eigen::Index j = i + 1; j < std::min(i + kMostReversed, count - 1); ++j) {
+        way += step(j - 1, j);
+        if (way > kReversedWay * branch.radii_mm(i)) break;
+        const double now = step(i - 1, i) + step(j, j + 1);
+        const double then = step(i - 1, j) + step(i, j + 1);
+        if (!turns_back(j) || then + way >= kWorthReversing * (now + way)) continue;
+        const Eigen::Index width = j - i + 1;
+        p.middleCols(i, width) = p.middleCols(i, width).rowwise().reverse().eval();
+        branch.radii_mm.segment(i, width) = branch.radii_mm.segment(i, width).reverse().eval();
+        reversed += static_cast<int>(width);
+        break;
+      }
+    }
+    if (reversed == before) break;
+  }
+  return reversed;
 }
 
 void reverse(CenterlineBranch& branch) {
@@ -70,6 +111,14 @@ class Cleaner {
     contract_branches_without_length();
     join_chains();
     for (int pass = 0; pass < kSpurPasses && drop_spurs(); ++pass) join_chains();
+    for (CenterlineBranch& branch : tree_.branches) {
+      if (const int points = put_in_order(branch); points > 0) {
+        warnings_.push_back(
+            fmt::format("branch {}: {} points that lead back and forth were taken in the order of "
+                        "the shorter way",
+                        branch.name, points));
+      }
+    }
     CleanedTree cleaned{std::move(tree_), {}};
     cleaned.warnings = std::move(warnings_);
     return cleaned;

@@ -16,9 +16,10 @@ struct CleanedTree {
 // In this order: points that repeat the one before them; branches without length (their nodes
 // become one); spurs, that is terminal branches whose tip lies inside the lumen of another branch
 // of their node (shortest first, and never below two branches at a node); nodes of degree two,
-// whose branches are joined under the name "<from>_<to>". A ring without junctions keeps one node.
-// Inlets that vanish are replaced by the widest end of their component. Names survive where their
-// node or branch does. O(points log points).
+// whose branches are joined under the name "<from>_<to>"; points that were traced out of order (the
+// course turns back twice within six radii, and the other order is shorter). A ring without
+// junctions keeps one node. Inlets that vanish are replaced by the widest end of their component.
+// Names survive where their node or branch does. O(points log points).
 CleanedTree clean_tree(const CenterlineTree& tree);
 
 }  // namespace angiospline

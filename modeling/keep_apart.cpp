@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -19,7 +20,7 @@ constexpr int kMoveRounds = 16;
 constexpr int kThinRounds = 12;
 constexpr double kMoveWidth = 4.0;  // radii to either side of a contact
 constexpr double kThinWidth = 3.0;
-constexpr double kHeldRadii = 2.0;   // of a branch at a junction that stay where they are
+constexpr double kHeldRadii = 2.0;   // of a branch at a junction that move with it, as one
 constexpr double kOvershoot = 1.15;  // of a step: what is smoothed over a width falls short
 constexpr double kKnotStep = 1.0;    // radii between knots of a path that moves
 constexpr double kAim = 0.02;        // radii beyond the clearance
@@ -44,15 +45,17 @@ class Separator {
  public:
   Separator(SmoothedTree& tree, const KeepApartOptions& options)
       : tree_(tree), options_(options), original_(tree.paths) {
-    std::vector<int> degree(tree.tree.nodes.size(), 0);
-    for (const CenterlineBranch& branch : tree.tree.branches) {
-      ++degree[index(branch.from)];
-      ++degree[index(branch.to)];
-    }
+    at_ = branches_at_nodes(tree.tree);
+    nodes_.assign(at_.size(), Vec3::Zero());
+    node_limits_mm_.assign(at_.size(), std::numeric_limits<double>::infinity());
     for (std::size_t b = 0; b < tree.paths.size(); ++b) {
       const CenterlineBranch& branch = tree.tree.branches[b];
-      joined_.push_back({degree[index(branch.from)] > 1, degree[index(branch.to)] > 1});
-      held_.push_back(held_part(tree.paths[b], joined_[b][0], joined_[b][1]));
+      const double last = tree.paths[b].knots().last();
+      for (const auto& [node, along] : {std::pair{branch.from, 0.0}, {branch.to, last}}) {
+        double& limit = node_limits_mm_[index(node)];
+        limit = std::min(limit, options.largest_move * tree.paths[b].at(along)(3));
+      }
+      prepare(b);
     }
   }
 
@@ -84,7 +87,14 @@ class Separator {
   void refine_paths(const std::vector<VesselContact>& contacts) {
     std::vector<char> touched(tree_.paths.size(), 0);
     for (const VesselContact& c : contacts) {
-      touched[index(c.first)] = touched[index(c.second)] = 1;
+      for (const auto& [branch, along] :
+           {std::pair{c.first, c.first_along}, {c.second, c.second_along}}) {
+        touched[index(branch)] = 1;
+        for (const bool at_end : {false, true}) {
+          if (!(hold(branch, at_end, along) > 0)) continue;
+          for (const int other : at_[index(node_of(branch, at_end))]) touched[index(other)] = 1;
+        }
+      }
     }
     for (std::size_t b = 0; b < touched.size(); ++b) {
       if (touched[b] == 0) continue;
@@ -101,22 +111,40 @@ class Separator {
       if (added.empty()) continue;
       tree_.paths[b] = insert_knots(path, added).value();
       original_[b] = tree_.paths[b];
-      held_[b] = held_part(tree_.paths[b], joined_[b][0], joined_[b][1]);
+      prepare(b);
     }
   }
 
-  // How free each control point is to move: 0 near junctions.
-  Eigen::VectorXd held_part(const BSplineCurve<4>& path, bool first, bool last) const {
-    const Eigen::Index count = path.control_points().cols();
-    Eigen::VectorXd freedom = Eigen::VectorXd::Ones(count);
-    const double length = path.knots().last();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const double at = path.knots().greville(static_cast<int>(i));
-      const double width = kHeldRadii * path.control_points()(3, i);
-      if (first) freedom(i) *= 1 - bump(std::max(0.0, at - width) / width);
-      if (last) freedom(i) *= 1 - bump(std::max(0.0, length - at - width) / width);
+  int node_of(int branch, bool at_end) const {
+    const CenterlineBranch& b = tree_.tree.branches[index(branch)];
+    return at_end ? b.to : b.from;
+  }
+
+  // How much a place on a branch belongs to the junction at its end: 1 within two radii of it, then
+  // less, 0 from four radii on and where the end is free.
+  double hold(int branch, bool at_end, double along) const {
+    if (at_[index(node_of(branch, at_end))].size() < 2) return 0.0;
+    const double last = tree_.paths[index(branch)].knots().last();
+    const double width = kHeldRadii * radius_at(branch, std::clamp(along, 0.0, last));
+    return bump(std::max(0.0, (at_end ? last - along : along) - width) / width);
+  }
+
+  // What of each control point belongs to the junctions at both ends, and its own way so far.
+  void prepare(std::size_t b) {
+    const KnotVector& knots = tree_.paths[b].knots();
+    const Eigen::Index count = knots.control_point_count();
+    if (b >= held_.size()) {
+      held_.resize(b + 1);
+      own_.resize(b + 1);
     }
-    return freedom;
+    own_[b] = Eigen::Matrix3Xd::Zero(3, count);
+    held_[b].resize(2, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double at = knots.greville(static_cast<int>(i));
+      for (const bool at_end : {false, true}) {
+        held_[b](at_end ? 1 : 0, i) = hold(static_cast<int>(b), at_end, at);
+      }
+    }
   }
 
   double radius_at(int branch, double along) const {
@@ -162,6 +190,7 @@ class Separator {
   // False when nothing can move any farther.
   bool move(const std::vector<VesselContact>& contacts) {
     std::vector<Request> all = requests();
+    std::vector<Vec4> of_nodes(nodes_.size(), Vec4::Zero());  // moves and their weights
     for (const VesselContact& c : contacts) {
       const double r1 = radius_at(c.first, c.first_along);
       const double r2 = radius_at(c.second, c.second_along);
@@ -175,30 +204,57 @@ class Separator {
           request.moves.col(i) += weight * across;
           request.weights(i) += weight;
         });
+        for (const bool at_end : {false, true}) {
+          const double weight = hold(branch, at_end, along);
+          Vec4& node = of_nodes[index(node_of(branch, at_end))];
+          node.head<3>() += weight * across;
+          node(3) += weight;
+        }
       };
       push(c.first, c.first_along, r1, -r2 / (r1 + r2) * step);
       push(c.second, c.second_along, r2, r1 / (r1 + r2) * step);
     }
     bool any = false;
+    std::vector<char> follows(tree_.paths.size(), 0);
+    for (std::size_t n = 0; n < nodes_.size(); ++n) {
+      if (!(of_nodes[n](3) > 0)) continue;
+      const Vec3 before = nodes_[n];
+      nodes_[n] += of_nodes[n].head<3>() / std::max(1.0, of_nodes[n](3));
+      const double most = node_limits_mm_[n];
+      if (nodes_[n].norm() > most) nodes_[n] *= most / nodes_[n].norm();
+      for (const int b : at_[n]) follows[index(b)] = 1;
+      any = any || (nodes_[n] - before).norm() > kWorthNaming * most;
+    }
     for (std::size_t b = 0; b < all.size(); ++b) {
-      if (all[b].weights.size() > 0) any = displace(b, all[b]) || any;
+      if (all[b].weights.size() > 0 || follows[b] != 0) any = displace(b, all[b]) || any;
     }
     return any;
   }
 
+  // A branch's own moves where it is free, and its junctions' where it is not.
   bool displace(std::size_t b, const Request& request) {
     Eigen::Matrix4Xd points = tree_.paths[b].control_points();
+    const CenterlineBranch& branch = tree_.tree.branches[b];
     double largest = 0;
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      if (!(request.weights(i) > 0)) continue;
-      const Vec3 home = original_[b].control_points().col(i).head<3>();
+      const Vec4 home = original_[b].control_points().col(i);
+      const double most = options_.largest_move * home(3);
+      const double at_first = held_[b](0, i);
+      const double at_last = held_[b](1, i);
+      if (request.weights.size() > 0 && request.weights(i) > 0) {
+        own_[b].col(i) += (1 - at_first) * (1 - at_last) / std::max(1.0, request.weights(i)) *
+                          request.moves.col(i);
+        if (own_[b].col(i).norm() > most) own_[b].col(i) *= most / own_[b].col(i).norm();
+      }
+      Vec3 away = own_[b].col(i) + at_first * nodes_[index(branch.from)] +
+                  at_last * nodes_[index(branch.to)];
+      if (branch.from == branch.to)
+        away = own_[b].col(i) + std::max(at_first, at_last) * nodes_[index(branch.from)];
+      // The junction's own place is no branch's to limit.
+      if (at_first < 1 && at_last < 1 && away.norm() > most) away *= most / away.norm();
       const Vec3 before = points.col(i).head<3>();
-      const double most = options_.largest_move * original_[b].control_points()(3, i);
-      Vec3 away =
-          before + held_[b](i) / std::max(1.0, request.weights(i)) * request.moves.col(i) - home;
-      if (away.norm() > most) away *= most / away.norm();
-      points.col(i).head<3>() = home + away;
-      largest = std::max(largest, (home + away - before).norm() / points(3, i));
+      points.col(i).head<3>() = home.head<3>() + away;
+      largest = std::max(largest, (points.col(i).head<3>() - before).norm() / points(3, i));
     }
     tree_.paths[b] = BSplineCurve<4>(tree_.paths[b].knots(), std::move(points));
     return largest > kWorthNaming;
@@ -260,7 +316,7 @@ class Separator {
             "branch {} was thinned to {:.0f} % to keep clear of its neighbours", name, 100 * kept));
       }
     }
-    // Free ends may have moved.
+    // Ends may have moved.
     for (std::size_t b = 0; b < tree_.paths.size(); ++b) {
       CenterlineBranch& branch = tree_.tree.branches[b];
       const double last = tree_.paths[b].knots().last();
@@ -274,8 +330,11 @@ class Separator {
   SmoothedTree& tree_;
   const KeepApartOptions& options_;
   std::vector<BSplineCurve<4>> original_;
-  std::vector<std::array<bool, 2>> joined_;  // ends of each branch that are at junctions
-  std::vector<Eigen::VectorXd> held_;
+  std::vector<std::vector<int>> at_;  // branches at each node
+  std::vector<Vec3> nodes_;           // how far each node has moved
+  std::vector<double> node_limits_mm_;
+  std::vector<Eigen::Matrix2Xd> held_;  // of each control point, by the junctions at both ends
+  std::vector<Eigen::Matrix3Xd> own_;   // how far each has moved by itself
 };
 
 }  // namespace

@@ -13,9 +13,10 @@ struct KeepApartOptions {
 
 // The tree with its paths moved and thinned until find_overlaps with the same clearance is empty or
 // the two limits are reached. Each vessel of a pair moves by a share that grows with the other's
-// radius, over four radii to either side, and not within two radii of a junction; then radii give
-// way over three. A warning names each branch that was moved or thinned, by how much, and each pair
-// that still is too near. Paths that touch nothing are unchanged. O(rounds x tree).
+// radius, over four radii to either side; what lies within two radii of a junction moves with it,
+// by no more than its thinnest branch may. Then radii give way over three. A warning names each
+// branch that was moved or thinned, by how much, and each pair that still is too near. Paths that
+// touch nothing are unchanged. O(rounds x tree).
 SmoothedTree keep_apart(SmoothedTree tree, const KeepApartOptions& options = {});
 
 }  // namespace angiospline

@@ -318,8 +318,9 @@ class Seeder {
     if (auto added = extend(b, true, end)) outcome.pieces.push_back(std::move(*added));
     const Eigen::Matrix4Xd target = followed(branch, start, end);
     BodyPiece piece = sweep(target, start, end);
-    if (piece.body.jacobian_ratio < kFoldedBody) {
-      BodyPiece freer = sweep(target, start, end, PathFreedom::kAnyMove);
+    for (const PathFreedom freedom : {PathFreedom::kNarrower, PathFreedom::kAnyMove}) {
+      if (piece.body.jacobian_ratio >= kFoldedBody) break;
+      BodyPiece freer = sweep(target, start, end, freedom);
       if (freer.body.jacobian_ratio > piece.body.jacobian_ratio) piece = std::move(freer);
     }
     if (piece.body.jacobian_ratio < kFoldedBody && !capped) {

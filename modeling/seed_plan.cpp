@@ -15,19 +15,14 @@ namespace angiospline {
 namespace {
 
 constexpr double kSamplesPerRadius = 6;
-constexpr double kLeastMargin = 0.3;  // of an opening beyond the blend, in radii
-constexpr double kLeastBlend = 0.4;   // of the blend asked for
-constexpr double kMergedOffset =
-    0.2;  // branches that begin this far from their node were moved to it
-constexpr double kPartingRadii = 0.5;  // from where they began to where they are aimed at, at first
-constexpr double kLeastBody = 0.4;     // length of a body, in radii
+constexpr double kLeastBody = 0.4;       // length of a body, in radii
 constexpr double kLeastStraight = 0.15;  // and of one that is straight
+constexpr double kPassing = 3.0;         // times its distance within which a path passes a centre
 constexpr double kRounding = 1e-9;
 constexpr double kWorthTightening = 0.05;  // radii by which an opening must come nearer
 constexpr double kStraightEnough = 0.7;    // chord over arc of a branch that may be taken straight
 constexpr double kDeepestSag = 0.75;       // radii between a branch and the chord it is taken for
 constexpr double kLongestExtension = 4;    // of a free end that lies within its junction, in radii
-constexpr int kDirectionRounds = 8;
 constexpr int kPlanRounds = 64;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -75,6 +70,24 @@ Vec4 PlannedBranch::at(double along) const {
   return (1 - f) * samples.col(i - 1) + f * samples.col(i);
 }
 
+double PlannedBranch::along_nearest(BranchEnd end, const Vec3& center) const {
+  const Eigen::Index n = samples.cols();
+  const auto column = [&](Eigen::Index i) { return end.at_end ? n - 1 - i : i; };
+  double nearest = (samples.col(column(0)).head<3>() - center).norm();
+  const double reach = kPassing * nearest;
+  double best = 0;
+  for (Eigen::Index i = 1; i < n; ++i) {
+    const double along = along_mm[static_cast<std::size_t>(column(i))];
+    const double from_end = end.at_end ? length_mm() - along : along;
+    if (from_end > reach) break;
+    const double away = (samples.col(column(i)).head<3>() - center).norm();
+    if (away >= nearest) continue;
+    nearest = away;
+    best = from_end;
+  }
+  return best;
+}
+
 std::optional<double> PlannedBranch::along_at_distance(BranchEnd end, const Vec3& center,
                                                        double distance) const {
   const Eigen::Index n = samples.cols();
@@ -86,9 +99,12 @@ std::optional<double> PlannedBranch::along_at_distance(BranchEnd end, const Vec3
     const double a = along_mm[static_cast<std::size_t>(column(i))];
     return end.at_end ? length_mm() - a : a;
   };
-  double before = away(0);
-  if (before >= distance) return 0.0;
-  for (Eigen::Index i = 1; i < n; ++i) {
+  const double passing = along_nearest(end, center);
+  Eigen::Index first = 0;
+  while (first + 1 < n && along(first) < passing) ++first;
+  double before = away(first);
+  if (before >= distance) return along(first);
+  for (Eigen::Index i = first + 1; i < n; ++i) {
     const double now = away(i);
     if (now >= distance) {
       const double f = (distance - before) / (now - before);
@@ -145,7 +161,7 @@ SeedPlan::SeedPlan(const SmoothedTree& tree, const JunctionOptions& options) : o
 void SeedPlan::detach(BranchEnd end) {
   PlannedNode& node = node_at(end);
   node.ends.erase(node.ends.begin() + slot_of(end));
-  node.caps_mm.clear();
+  node.forget_openings();
   node.alive = !node.ends.empty();
 }
 
@@ -234,7 +250,7 @@ void SeedPlan::merge(int b, const std::string& why) {
     return std::pair(x.branch, x.at_end) < std::pair(y.branch, y.at_end);
   });
   a.reach = 1.0;
-  a.caps_mm.clear();
+  a.forget_openings();
   dirty_[index(kept)] = 1;
   for (const BranchEnd& end : a.ends) branches_[index(end.branch)].tried_straight = false;
   join_through(kept);
@@ -288,87 +304,6 @@ void SeedPlan::extend(int b, double missing) {
   warnings_.push_back(
       fmt::format("branch {} was made longer by {:.3g} mm: it ended within its junction",
                   branch.name, missing));
-}
-
-// ---------------------------------------------------------------- measuring junctions
-
-// Directions are those from the centre to the openings' centres on the paths, whose distances
-// depend on the directions: a fixed point, found by repetition from the nearest possible openings
-// outward (damped after a few rounds).
-void SeedPlan::measure(PlannedNode& node) const {
-  const std::size_t n = node.ends.size();
-  std::vector<double> distance(n);
-  node.spec.center_mm = node.center_mm;
-  node.spec.branches.assign(n, {});
-  node.meets_mm.assign(n, 0.0);
-  node.caps_mm.resize(n, std::numeric_limits<double>::infinity());
-  node.error.reset();
-  for (std::size_t k = 0; k < n; ++k) {
-    const BranchEnd end = node.ends[k];
-    const PlannedBranch& branch = branches_[index(end.branch)];
-    const Vec4 first = branch.at(end.at_end ? branch.length_mm() : 0.0);
-    distance[k] = first(3);
-    // Branches of a merged node may begin away from its centre: they part beyond where they begin.
-    const double away = (first.head<3>() - node.center_mm).norm();
-    if (away > kMergedOffset * first(3)) node.meets_mm[k] = away + kPartingRadii * first(3);
-  }
-  const auto aim = [&] {
-    for (std::size_t k = 0; k < n; ++k) {
-      const BranchEnd end = node.ends[k];
-      const PlannedBranch& branch = branches_[index(end.branch)];
-      const double meets = std::max(node.meets_mm[k], node.reach * distance[k]);
-      const double s =
-          branch.along_at_distance(end, node.center_mm, meets).value_or(branch.length_mm());
-      Vec4 target = branch.at(end.at_end ? branch.length_mm() - s : s);
-      const double radius = target(3);
-      if (branch.straight) target.head<3>() = node_at({end.branch, !end.at_end}).center_mm;
-      const Vec3 chord = target.head<3>() - node.center_mm;
-      node.spec.branches[k] = {branch.name, chord.normalized(), radius, 0.0};
-    }
-  };
-  for (int round = 0; round < kDirectionRounds; ++round) {
-    aim();
-    const auto next = opening_distances_mm(node.spec, options_);
-    if (!next) {
-      // Branches that leave together part farther out.
-      node.error = next.error();
-      for (double& d : distance) d *= 1.5;
-      for (std::size_t k = 0; k < n; ++k) {
-        if (node.meets_mm[k] > 0) node.meets_mm[k] += 0.5 * node.spec.branches[k].radius_mm;
-      }
-      continue;
-    }
-    node.error.reset();
-    double change = 0;
-    for (std::size_t k = 0; k < n; ++k) {
-      const double capped = std::min((*next)[k], node.caps_mm[k]);
-      const double to = round < 3 ? capped : (capped + distance[k]) / 2;
-      change = std::max(change, std::abs(to - distance[k]) / node.spec.branches[k].radius_mm);
-      distance[k] = to;
-    }
-    if (change < 0.02) break;
-  }
-  if (node.error) return;
-  aim();
-  JunctionOptions tight = options_;
-  tight.margin = std::min(kLeastMargin, options_.margin);
-  tight.blend = kLeastBlend * options_.blend;
-  const auto wanted = opening_distances_mm(node.spec, options_);
-  const auto least = opening_distances_mm(node.spec, tight);
-  if (!wanted || !least) {
-    node.error = wanted ? least.error() : wanted.error();
-    return;
-  }
-  node.least_mm = *least;
-  node.wanted_mm = *wanted;
-  for (std::size_t k = 0; k < n; ++k) {
-    node.wanted_mm[k] = std::max(node.least_mm[k], std::min(node.wanted_mm[k], node.caps_mm[k]));
-  }
-  if (node.reach > 1) {
-    for (std::size_t k = 0; k < n; ++k) {
-      node.meets_mm[k] = std::max(node.meets_mm[k], node.reach * distance[k]);
-    }
-  }
 }
 
 // ---------------------------------------------------------------- room along branches
@@ -516,8 +451,13 @@ void SeedPlan::settle() {
       if (!tighten()) return;
       continue;
     }
-    tbb::parallel_for(std::size_t{0}, work.size(),
-                      [&](std::size_t k) { measure(nodes_[index(work[k])]); });
+    std::vector<PlannedNode> measured(work.size());
+    tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
+      measured[k] = nodes_[index(work[k])];
+      measure(measured[k]);
+      if (!measured[k].relieved) relieve(measured[k]);
+    });
+    for (std::size_t k = 0; k < work.size(); ++k) nodes_[index(work[k])] = std::move(measured[k]);
     std::vector<char> look(branches_.size(), 0);
     for (const int n : work) {
       for (const BranchEnd& end : nodes_[index(n)].ends) look[index(end.branch)] = 1;

@@ -30,8 +30,11 @@ struct PlannedBranch {
 
   double length_mm() const { return along_mm.back(); }
   Vec4 at(double along) const;  // linear between samples, held beyond the ends
-  // Arc length, counted from `end`, where the path first comes to `distance_mm` from `center`;
-  // nothing if it never does.
+  // Arc length, counted from `end`, of the place nearest to `center`, if the path begins away from
+  // it and passes it: no farther on than three times its distance.
+  double along_nearest(BranchEnd end, const Vec3& center) const;
+  // Arc length, counted from `end`, where the path from there on first comes to `distance_mm` from
+  // `center`; nothing if it never does.
   std::optional<double> along_at_distance(BranchEnd end, const Vec3& center,
                                           double distance_mm) const;
 };
@@ -52,7 +55,15 @@ struct PlannedNode {
   std::vector<double> caps_mm;    // the branch leaves no room for an opening farther out
   std::optional<Error> error;     // why no openings could be found
   double reach = 1.0;             // directions are taken at this multiple of the openings' distance
+  std::vector<double> farther_mm;  // openings lie at least so far out
+  bool relieved = false;  // its centre and distances were chosen by what they ask of bodies
 
+  // What was found for the branches that end here, when these are others.
+  void forget_openings() {
+    caps_mm.clear();
+    farther_mm.clear();
+    relieved = false;
+  }
   bool is_junction() const { return alive && ends.size() >= 3; }
 };
 
@@ -79,7 +90,15 @@ class SeedPlan {
 
  private:
   struct Room;
+  // In seed_plan_measure.cpp.
   void measure(PlannedNode& node) const;
+  void aim(PlannedNode& node, const std::vector<double>& distance_mm) const;
+  bool find_distances(PlannedNode& node, std::vector<double>& distance_mm) const;
+  double strain_at(const PlannedNode& node, std::size_t slot) const;
+  double overlap_behind(const PlannedNode& node, std::size_t i, std::size_t j) const;
+  double strain_of(const PlannedNode& node) const;
+  void relieve(PlannedNode& node) const;
+  std::vector<Vec3> other_centres(const PlannedNode& node) const;
   Room room_of(int branch) const;
   double end_along(int branch, bool at_end, bool wanted) const;
   double planned_mm(BranchEnd end) const;

@@ -21,9 +21,10 @@ constexpr const char* kStage = "smooth centerlines";
 
 // A junction's openings lie farther out than this, in radii of its thickest branch: bends inside do
 // not reach any wall.
-constexpr double kHidden = 1.5;
+constexpr double kHidden = 1.0;
 
 constexpr std::size_t kNamedOverlaps = 50;  // pairs that are warned of by name
+constexpr double kWorthNaming = 0.95;       // of its radius that a branch keeps in its bends
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -155,7 +156,7 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
     branches[b].points_mm.col(0) = result.tree.nodes[index(branches[b].from)].position_mm;
     branches[b].points_mm.rightCols(1) = result.tree.nodes[index(branches[b].to)].position_mm;
     result.largest_move_mm = std::max(result.largest_move_mm, paths[b]->largest_move_mm);
-    if (paths[b]->radius_reduced_to < 1.0) {
+    if (paths[b]->radius_reduced_to < kWorthNaming) {
       result.warnings.push_back(fmt::format(
           "branch {} bends more sharply than its radius allows: radius reduced to {:.0f} % there",
           branches[b].name, 100 * paths[b]->radius_reduced_to));

@@ -185,6 +185,29 @@ TEST(CleanTree, ATwigThatLeavesTheLumenStays) {
   EXPECT_TRUE(cleaned.warnings.empty());
 }
 
+TEST(CleanTree, PointsTracedOutOfOrderAreExchangedAndHairpinsAreNot) {
+  const auto of_points = [](std::vector<Vec3> points) {
+    PointGraph graph;
+    for (const Vec3& p : points) {
+      const int id = static_cast<int>(graph.points.size());
+      graph.points.push_back({std::to_string(id), p, 1.0});
+      if (id > 0) graph.edges.emplace_back(id - 1, id);
+    }
+    return clean_tree(tree_of(graph));
+  };
+  const CleanedTree zigzag =
+      of_points({{0, 0, 0}, {0, 0, 3}, {0.3, 0, 6}, {0, 0.6, 4.5}, {0, 0, 8}, {0, 0, 11}});
+  EXPECT_EQ(zigzag.tree.branches[0].points_mm(2, 2), 4.5);
+  EXPECT_EQ(zigzag.tree.branches[0].points_mm(2, 3), 6.0);
+  ASSERT_EQ(zigzag.warnings.size(), 1U);
+  EXPECT_NE(zigzag.warnings[0].find("branch 0_5: 2 points"), std::string::npos);
+  const CleanedTree hairpin =
+      of_points({{0, 0, 0}, {0, 0, 3}, {0, 0, 6}, {1.2, 0, 6.2}, {1.5, 0, 3}, {1.5, 0, 0}});
+  EXPECT_TRUE(hairpin.warnings.empty());
+  const CleanedTree spike = of_points({{0, 0, 0}, {0, 0, 6}, {1, 0, 3}, {1, 0, -2}});
+  EXPECT_TRUE(spike.warnings.empty());
+}
+
 TEST(CleanTree, ARingKeepsOneNode) {
   PointGraph graph;
   add_line(graph, 24, -1, [](double t) {
