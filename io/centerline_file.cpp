@@ -187,7 +187,13 @@ Result<CenterlineTree> read_centerline_file(const std::filesystem::path& path,
                    "vertices.csv and edges.csv stand beside each other"});
     }
   }
-  return format->parse(*text, path.string(), options);
+  Result<CenterlineTree> tree = format->parse(*text, path.string(), options);
+  if (tree && options.voxel_width && format->parse != parse_gxl) {
+    tree->assumptions.emplace_back(
+        "voxel width: not used, for only VascuSynth's files count in voxels (--unit scales "
+        "others)");
+  }
+  return tree;
 }
 
 Result<CenterlineTree> read_centerline_files(const std::vector<std::filesystem::path>& paths,

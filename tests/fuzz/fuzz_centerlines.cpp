@@ -1,71 +1,10 @@
 // libFuzzer's entry for the reader named by ANGIOSPLINE_FUZZ_READER: whatever the bytes, a tree
 // that keeps its invariants or an error of one line, within libFuzzer's limits of time and memory.
-#include <cstdint>
-#include <cstdlib>
-#include <string_view>
-
-#include "io/csv_centerline.h"
-#include "io/graphml_file.h"
-#include "io/gxl_file.h"
-#include "io/network_tables.h"
-#include "io/simvascular_file.h"
-#include "io/swc_file.h"
-#include "io/tree_definition.h"
-#include "io/vtk_centerline.h"
-#include "modeling/smooth_centerlines.h"
-
-namespace angiospline {
-namespace {
-
-[[maybe_unused]] Result<CenterlineTree> tables(std::string_view text, std::string_view name,
-                                               const CenterlineFileOptions& options) {
-  const std::size_t cut = text.find("====");  // between the vertices and the edges
-  if (cut == std::string_view::npos) return parse_network_tables(text, name, text, name, options);
-  return parse_network_tables(text.substr(0, cut), name, text.substr(cut + 4), name, options);
-}
-
-[[maybe_unused]] Result<CenterlineTree> simvascular(std::string_view text, std::string_view name,
-                                                    const CenterlineFileOptions&) {
-  const auto path = parse_pth(text, name);
-  const auto group = parse_ctgr(text, name);
-  if (!group && !path) return fail(group.error());
-  return CenterlineTree{};
-}
-
-void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-void check(const CenterlineTree& tree) {
-  const int nodes = static_cast<int>(tree.nodes.size());
-  for (const CenterlineBranch& branch : tree.branches) {
-    require(branch.from >= 0 && branch.from < nodes && branch.to >= 0 && branch.to < nodes);
-    require(branch.points_mm.cols() >= 2 && branch.points_mm.cols() == branch.radii_mm.size());
-    require(branch.points_mm.allFinite() && branch.radii_mm.minCoeff() > 0);
-    require(branch.points_mm.col(0) == tree.nodes[std::size_t(branch.from)].position_mm);
-    require(branch.points_mm.rightCols(1) == tree.nodes[std::size_t(branch.to)].position_mm);
-  }
-  const auto at = branches_at_nodes(tree);
-  for (const int n : tree.inlets) require(n >= 0 && n < nodes && at[std::size_t(n)].size() == 1);
-}
-
-}  // namespace
-}  // namespace angiospline
+#include "tests/fuzz/reader_checks.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace angiospline;
-  const std::string_view text(reinterpret_cast<const char*>(data), size);
-  const auto tree = ANGIOSPLINE_FUZZ_READER(text, "fuzz", {});
-  if (!tree) {
-    require(tree.error().message().find('\n') == std::string::npos);
-    return 0;
-  }
-  check(*tree);
-  constexpr std::size_t kSmallEnoughToSmooth = 4;
-  if (tree->branches.empty() || tree->branches.size() > kSmallEnoughToSmooth) return 0;
-  const auto smooth = smooth_centerlines(*tree);
-  if (!smooth) return 0;
-  check(smooth->tree);
-  for (const auto& path : smooth->paths) require(path.control_points().allFinite());
+  using namespace angiospline;        // the readers
+  using namespace angiospline::fuzz;  // and those made of two
+  read_and_check(ANGIOSPLINE_FUZZ_READER, {reinterpret_cast<const char*>(data), size});
   return 0;
 }
