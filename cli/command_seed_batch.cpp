@@ -1,5 +1,6 @@
 // Many trees into one folder: each in a process of its own, a record beside its files, one table.
 #include <algorithm>
+#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -212,6 +213,8 @@ Result<void> settle(Job& job, const ChildRun& run, const fs::path& folder) {
       job.state = "refused";
       break;
     case kStopped:
+    case 128 + SIGTERM:  // asked to stop before it could listen
+      job.exit_code = kStopped;
       job.state = "stopped";
       break;
     default:
@@ -228,16 +231,17 @@ Result<void> settle(Job& job, const ChildRun& run, const fs::path& folder) {
 // ---- the table
 
 Json row_of(const Job& job) {
-  const Json check = job.figures.value("check", Json::object());
-  const Json failed = job.figures.value("failed", Json::array());
+  const Json figures = job.figures.is_object() ? job.figures : Json::object();  // null: not run
+  const Json check = figures.value("check", Json::object());
+  const Json failed = figures.value("failed", Json::array());
   return {{"name", job.name},
           {"input", job.input.string()},
           {"state", job.state},
           {"exit_code", job.exit_code},
-          {"branches", job.figures.value("branches", Json())},
-          {"junctions", job.figures.value("junctions", Json())},
-          {"loops", job.figures.value("loops", Json())},
-          {"failed", job.figures.empty() ? Json() : Json(failed.size())},
+          {"branches", figures.value("branches", Json())},
+          {"junctions", figures.value("junctions", Json())},
+          {"loops", figures.value("loops", Json())},
+          {"failed", figures.empty() ? Json() : Json(failed.size())},
           {"solids", check.value("solids", Json())},
           {"closed", check.value("closed", Json())},
           {"valid", check.value("valid", Json())},

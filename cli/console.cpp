@@ -71,6 +71,7 @@ struct Console::State {
 Console::Console() : state_(std::make_shared<State>()) {
   std::signal(SIGINT, note_stop);
   std::signal(SIGTERM, note_stop);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
 }
 
 Console::~Console() { finish_line(); }

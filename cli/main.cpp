@@ -159,8 +159,8 @@ void add_seed(CLI::App& app, CommandLine& line) {
       ->check(CLI::Range(1, 1024));
   command->add_option("--threads", a.threads, "processors used for one tree (default: all)")
       ->check(CLI::Range(1, 1024));
-  command->add_option("--unit", a.reading.unit, "unit of the file: mm, cm, m or um")
-      ->check(CLI::IsMember({"mm", "cm", "m", "um"}));
+  command->add_option("--unit", a.reading.unit,
+                      "unit of the file: m, cm, mm, um, nm, inch or a number of them, like 0.04mm");
   command->add_flag("--radius-is-diameter", a.reading.radius_is_diameter,
                     "the radius column holds diameters");
   command

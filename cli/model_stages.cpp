@@ -31,15 +31,18 @@ Result<Certificate> finish_model(const Model& model,
                                  Stopwatch& watch) {
   ExportOptions options;
   options.step_schema = step_schema(schema);
-  if (const auto written = export_model(model, paths, options, console.progress()); !written) {
-    return fail(written.error());
-  }
-  watch.lap("write");
-  const auto solid = make_solid(model.network);
-  if (!solid) return fail(solid.error());
-  auto certificate = certify(*solid, {}, console.progress());
-  watch.lap("check");
-  return certificate;
+  std::optional<Result<Certificate>> certificate;
+  const auto check = [&] {
+    watch.lap("write");
+    const auto solid = make_solid(model.network);
+    certificate =
+        solid ? certify(*solid, {}, console.progress()) : Result<Certificate>(fail(solid.error()));
+    watch.lap("check");
+  };
+  const auto written = export_model(model, paths, options, console.progress(), check);
+  watch.lap("wait for files");
+  if (!written) return fail(written.error());
+  return *std::move(certificate);
 }
 
 int tell_outcome(const Model& model, const Certificate& certificate,

@@ -1,5 +1,6 @@
 #include "io/brep_file.h"
 
+#include <exception>
 #include <fstream>
 #include <locale>
 #include <optional>
@@ -45,6 +46,8 @@ Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& pa
     return {};
   } catch (const Standard_Failure& failure) {
     return cannot_write(path, std::string("OpenCASCADE failed: ") + failure.GetMessageString());
+  } catch (const std::exception&) {  // from a stream that OpenCASCADE could not go on writing to
+    return cannot_write(path, "could not be written");
   }
 }
 
@@ -141,6 +144,8 @@ Result<Solid> read_brep(const std::filesystem::path& path, const Progress& progr
     return make_solid_value(shape, std::move(faces));
   } catch (const Standard_Failure& failure) {
     return bad(std::string("OpenCASCADE failed: ") + failure.GetMessageString());
+  } catch (const std::exception& failure) {
+    return bad(std::string("cannot be read: ") + failure.what());
   }
 }
 

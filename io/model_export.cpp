@@ -5,6 +5,9 @@
 #include <cctype>
 #include <optional>
 #include <system_error>
+#include <thread>
+
+#include <tbb/global_control.h>
 
 #include "io/brep_file.h"
 #include "io/glb_file.h"
@@ -12,6 +15,7 @@
 #include "io/iges_file.h"
 #include "io/model_file.h"
 #include "io/report_html.h"
+#include "io/side_process.h"
 #include "io/stl_file.h"
 #include "io/vtk_file.h"
 #include "modeling/certificate.h"
@@ -115,6 +119,59 @@ Result<void> write_measured_report(const fs::path& path, const Model& model,
   return write_report(path, model, mesh, extras);
 }
 
+// Whether a second process has a processor to run on.
+bool may_work_aside() {
+  return std::thread::hardware_concurrency() > 1 &&
+         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) > 1;
+}
+
+// The files of one model; solids and triangles are made when the first of them asks.
+class ModelWriter {
+ public:
+  ModelWriter(const Model& model, const std::vector<fs::path>& paths, const ExportOptions& options,
+              const Progress& progress)
+      : model_(model), paths_(paths), options_(options), progress_(progress) {}
+
+  Result<void> write(const fs::path& path) {
+    const Format format = *format_of(path);
+    if (needs_solid(format)) {
+      const auto solid = solid_for(format);
+      if (!solid) return fail(solid.error());
+      return format == Format::kGmsh ? write_gmsh_script(**solid, *step_among(paths_), path)
+                                     : write_solid(**solid, model_.name, path, options_, progress_);
+    }
+    if (format == Format::kNative) return write_model(path, model_);
+    if (!mesh_) {
+      auto made = tessellate(model_.network, options_.tessellation, progress_);
+      if (!made) return fail(made.error());
+      mesh_ = std::move(made->mesh);
+    }
+    return format == Format::kReport ? write_measured_report(path, model_, *mesh_, progress_)
+                                     : write_triangles(*mesh_, model_.name, path);
+  }
+
+ private:
+  Result<const Solid*> solid_for(Format format) {
+    const bool short_edges = wants_short_edges(format);
+    std::optional<Solid>& solid = solids_[short_edges ? 1 : 0];
+    if (!solid) {
+      SurfaceNetwork turned = turn_long_patches(model_.network);
+      auto made = make_solid(short_edges ? split_joins(std::move(turned), options_.edges)
+                                         : std::move(turned));
+      if (!made) return fail(made.error());
+      solid = std::move(*made);
+    }
+    return &*solid;
+  }
+
+  const Model& model_;
+  const std::vector<fs::path> paths_;
+  const ExportOptions& options_;
+  const Progress& progress_;
+  std::array<std::optional<Solid>, 2> solids_;  // with the network's own edges; with short ones
+  std::optional<TriangleMesh> mesh_;
+};
+
 }  // namespace
 
 std::string exported_suffixes() {
@@ -143,7 +200,8 @@ Result<void> check_export_target(const fs::path& path) {
 }
 
 Result<void> export_model(const Model& model, const std::vector<fs::path>& paths,
-                          const ExportOptions& options, const Progress& progress) {
+                          const ExportOptions& options, const Progress& progress,
+                          const std::function<void()>& meanwhile) {
   for (const fs::path& path : paths) {
     if (auto target = check_export_target(path); !target) return target;
     if (*format_of(path) == Format::kGmsh && !step_among(paths)) {
@@ -154,41 +212,22 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
                    "a .geo script loads a .step that is written with it"});
     }
   }
-  std::array<std::optional<Solid>, 2> solids;  // with the network's own edges; with short ones
-  std::optional<TriangleMesh> mesh;
+  const std::optional<fs::path> step = step_among(paths);
+  const bool aside = step && (paths.size() > 1 || meanwhile) && may_work_aside();
+  const SideProcess::Work write_step_file = [&](const Progress& its_own) {
+    return ModelWriter(model, {*step}, options, its_own).write(*step);
+  };
+  std::optional<SideProcess> copy = aside ? SideProcess::start(write_step_file) : std::nullopt;
+  ModelWriter writer(model, paths, options, progress);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     progress.at("writing " + paths[i].filename().string(),
                 static_cast<double>(i) / static_cast<double>(paths.size()));
     if (progress.should_stop()) return fail(cancelled("writing"));
-    const Format format = *format_of(paths[i]);
-    Result<void> written;
-    if (needs_solid(format)) {
-      std::optional<Solid>& solid = solids[wants_short_edges(format) ? 1 : 0];
-      if (!solid) {
-        SurfaceNetwork turned = turn_long_patches(model.network);
-        auto made =
-            make_solid(wants_short_edges(format) ? split_joins(std::move(turned), options.edges)
-                                                 : std::move(turned));
-        if (!made) return fail(made.error());
-        solid = std::move(*made);
-      }
-      written = format == Format::kGmsh
-                    ? write_gmsh_script(*solid, *step_among(paths), paths[i])
-                    : write_solid(*solid, model.name, paths[i], options, progress);
-    } else if (needs_triangles(format) || format == Format::kReport) {
-      if (!mesh) {
-        auto made = tessellate(model.network, options.tessellation, progress);
-        if (!made) return fail(made.error());
-        mesh = std::move(made->mesh);
-      }
-      written = format == Format::kReport ? write_measured_report(paths[i], model, *mesh, progress)
-                                          : write_triangles(*mesh, model.name, paths[i]);
-    } else {
-      written = write_model(paths[i], model);
-    }
-    if (!written) return written;
+    if (copy && paths[i] == *step) continue;
+    if (auto written = writer.write(paths[i]); !written) return written;
   }
-  return {};
+  if (meanwhile) meanwhile();
+  return copy ? copy->wait(progress) : Result<void>();
 }
 
 Result<void> export_solid(const Solid& solid, const std::string& name,

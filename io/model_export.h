@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -32,9 +33,13 @@ Result<void> check_export_target(const std::filesystem::path& path);
 // .vtu, .html (the report, with its facts beside it), .geo (a Gmsh script that
 // loads the .step among the paths and names its faces). Solids and triangles are made once, and
 // only if a path needs them. Each file appears whole or not at all; targets are checked before
-// the first is written. Errors: those of the writers.
+// the first is written. OpenCASCADE writes one file at a time in one process: where there is more
+// to do than the STEP file and more than one thread is allowed, that is written by a copy of this
+// process; `meanwhile` is called once in any case, and on this thread. Errors: those of the
+// writers.
 Result<void> export_model(const Model& model, const std::vector<std::filesystem::path>& paths,
-                          const ExportOptions& options = {}, const Progress& progress = {});
+                          const ExportOptions& options = {}, const Progress& progress = {},
+                          const std::function<void()>& meanwhile = {});
 
 // The same for a solid by anyone, to every format but the native one.
 Result<void> export_solid(const Solid& solid, const std::string& name,
