@@ -30,6 +30,7 @@ Result<Certificate> finish_model(const Model& model,
                                  const std::string& schema, const Console& console,
                                  Stopwatch& watch) {
   ExportOptions options;
+  options.step_in_side_process = true;
   options.step_schema = step_schema(schema);
   std::optional<Result<Certificate>> certificate;
   const auto check = [&] {

@@ -213,7 +213,8 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
     }
   }
   const std::optional<fs::path> step = step_among(paths);
-  const bool aside = step && (paths.size() > 1 || meanwhile) && may_work_aside();
+  const bool aside =
+      options.step_in_side_process && step && (paths.size() > 1 || meanwhile) && may_work_aside();
   const SideProcess::Work write_step_file = [&](const Progress& its_own) {
     return ModelWriter(model, {*step}, options, its_own).write(*step);
   };

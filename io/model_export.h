@@ -21,6 +21,9 @@ struct ExportOptions {
   StepSchema step_schema = StepSchema::kAp242;
   TessellationOptions tessellation;  // of GLB, STL, VTP and VTU
   SplitOptions edges;                // of STEP and BREP, so that Gmsh meshes them as they are
+  // Lets a copy of this process (fork) write the STEP file beside the others. For programs whose
+  // only threads are ours: what another thread has locked stays locked in the copy.
+  bool step_in_side_process = false;
 };
 
 // The suffixes that export_model writes, for messages: ".json .step ...".
@@ -33,10 +36,10 @@ Result<void> check_export_target(const std::filesystem::path& path);
 // .vtu, .html (the report, with its facts beside it), .geo (a Gmsh script that
 // loads the .step among the paths and names its faces). Solids and triangles are made once, and
 // only if a path needs them. Each file appears whole or not at all; targets are checked before
-// the first is written. OpenCASCADE writes one file at a time in one process: where there is more
-// to do than the STEP file and more than one thread is allowed, that is written by a copy of this
-// process; `meanwhile` is called once in any case, and on this thread. Errors: those of the
-// writers.
+// the first is written. OpenCASCADE writes one file at a time in one process: where the options
+// allow it, there is more to do than the STEP file and more than one thread is allowed, that is
+// written by a copy of this process; `meanwhile` is called once in any case, and on this thread.
+// Errors: those of the writers.
 Result<void> export_model(const Model& model, const std::vector<std::filesystem::path>& paths,
                           const ExportOptions& options = {}, const Progress& progress = {},
                           const std::function<void()>& meanwhile = {});
