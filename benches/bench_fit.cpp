@@ -3,6 +3,7 @@
 //   tree bench_fit crowded               neighbours, unequal voxels, a ramp, Rician noise: bent
 //   tube, SNR 8, 4 bench_fit starts [phantom ...]  displaced and resized starts at SNR 8 and 4
 //   bench_fit own                   bifurcation and tree from their own segmentation, SNR 8
+// ALL=1: every start, not only those that stay beyond the goal; REDUCE=x: FitOptions::reduction.
 // SEEDS=n: noise seeds (default 3); FIRST=n: the first of them (default 1); SNR=x: only this one.
 #include <algorithm>
 #include <chrono>
@@ -82,8 +83,6 @@ Result<Outcome> outcome(const FitPhantom& phantom, const Model& start, const Ima
   const auto before = std::chrono::steady_clock::now();
   FitOptions options;
   if (std::getenv("WAVE")) options.displacement.wave_factors = {from_environment("WAVE", 1)};
-  if (std::getenv("HW")) options.displacement.half_windows_vox = {1.5, from_environment("HW", 1)};
-  options.rounds = static_cast<int>(from_environment("ROUNDS", 1));
   options.reduction = from_environment("REDUCE", options.reduction);
   const auto fitted = fit_model(start, image, options);
   if (!fitted) return fail(fitted.error());
@@ -245,7 +244,6 @@ void starts(const std::vector<std::string>& only) {
       for (const double size : {0.0, 1.5, 3.0}) {
         for (const Vec3& way : {Vec3(1, 0, 0), Vec3(-0.6, 0.8, 0), Vec3(0, -1, 0)}) {
           if (size == 0 && way.x() != 1) continue;
-          if (std::getenv("ONLY") && (size != 1.5 || way.x() != -0.6)) continue;
           for (const double factor : {0.5, 1.0, 1.5}) {
             const auto start = seed_model(displaced(phantom.tree, size * way, factor));
             const auto o =

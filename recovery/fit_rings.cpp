@@ -361,7 +361,8 @@ struct ReducedRing {
 // it within the tolerance along its normals. Nothing if that takes as many as it has.
 std::optional<ReducedRing> reduced_ring(const SurfaceNetwork& network, const StripRing& ring,
                                         double tolerance_mm) {
-  constexpr int kSections = 4;  // for each row of the ring
+  constexpr int kSections = 4;        // for each row of the ring
+  constexpr double kLeastStep = 0.5;  // of the steps between sections
   const CrossSections sections(network, ring);
   if (!sections.has_axis()) return {};
   std::vector<double> places;
@@ -401,7 +402,16 @@ std::optional<ReducedRing> reduced_ring(const SurfaceNetwork& network, const Str
     for (std::size_t k = 0; k < cuts.size() && solved; ++k) {
       farthest = std::max(farthest, sections.distance_mm(cuts[k], trial[k]));
     }
-    if (solved && farthest <= tolerance_mm) return reduced;
+    // Steps along every line keep half of what they were: nothing comes near to folding.
+    bool sound = solved;
+    for (std::size_t k = 0; k + 1 < cuts.size() && sound; ++k) {
+      for (int c = 0; c < n && sound; ++c) {
+        const Vec3 step = cuts[k + 1].ring.col(c) - cuts[k].ring.col(c);
+        const Vec3 now = trial[k + 1].col(c) - trial[k].col(c);
+        sound = now.dot(step) >= kLeastStep * step.squaredNorm();
+      }
+    }
+    if (sound && farthest <= tolerance_mm) return reduced;
   }
   return {};
 }
