@@ -261,6 +261,7 @@ std::vector<std::string> parts(const std::string& text) {
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
+  if (what.empty()) return run_sizes(1000, parts("step,iges,glb")) + run_families(1, 1, "");
   if (what == "sizes") {
     return run_sizes(argc > 2 ? std::atoi(argv[2]) : 10000,
                      parts(argc > 3 ? argv[3] : "step,iges,glb"));

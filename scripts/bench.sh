@@ -12,7 +12,7 @@ while [ $# -gt 0 ] && [ "$1" != "--" ]; do names+=("bench_${1#bench_}"); shift; 
 [ $# -gt 0 ] && shift
 mkdir -p build
 cmake -S . -B build/bench -G Ninja -DCMAKE_BUILD_TYPE=Release -DANGIOSPLINE_TESTS=OFF \
-  -DANGIOSPLINE_BENCHES=ON >build/bench.log 2>&1 || { cat build/bench.log >&2; exit 1; }
+  -DANGIOSPLINE_BENCHES=ON -DANGIOSPLINE_WARNINGS_AS_ERRORS=ON >build/bench.log 2>&1 || { cat build/bench.log >&2; exit 1; }
 grep -E "SISL not found" build/bench.log >&2 || true
 if [ ${#names[@]} -eq 0 ]; then
   mapfile -t names < <(cmake --build build/bench --target help | grep -oE '^bench_[a-z_]+' | sort -u)
