@@ -1,5 +1,7 @@
-// Sweeps random junctions of every class: success, fairness and seconds, one line a class; then how
-// long template and smoothing of one bifurcation take. Seconds are of CPU time, one thread.
+// Sweeps random junctions of every class: success, fairness and seconds, one line a class and one
+// for all; then how long template and smoothing take. Seconds are of CPU time, one thread. What is
+// not sound or not fair is named on stderr with its failure. CLASS: a class, "hard" (all but the
+// ordinary ones) or "all".
 // bench_junctions [COUNT [SEED [CLASS [DUMP_DIRECTORY]]]]
 #include <algorithm>
 #include <cstdlib>
@@ -33,41 +35,78 @@ void dump(const std::string& path, const Junction& junction) {
   }
 }
 
-void sweep(const JunctionClass& family, int count, std::uint64_t seed,
-           const std::string& directory) {
-  Random random(seed);
-  int ok = 0, fair = 0, first = 0;
-  double angle = 0, jacobian = 1, seconds = 0, distance = 0, moved = 0;
+// What a sweep found.
+struct Tally {
+  int count = 0;
+  int ok = 0;
+  int fair = 0;
+  int gentle = 0;  // fair, and curvature times smallest radius at most kGentle
+  int first = 0;   // done by the first setting
+  double angle = 0;
+  double jacobian = 1;
+  double distance = 0;
+  double moved = 0;
+  double seconds = 0;
   std::vector<double> curvature;
+};
+constexpr double kGentle = 8;
+
+void add(Tally& all, const Tally& part) {
+  all.count += part.count;
+  all.ok += part.ok;
+  all.fair += part.fair;
+  all.gentle += part.gentle;
+  all.first += part.first;
+  all.angle = std::max(all.angle, part.angle);
+  all.jacobian = std::min(all.jacobian, part.jacobian);
+  all.distance = std::max(all.distance, part.distance);
+  all.moved = std::max(all.moved, part.moved);
+  all.seconds += part.seconds;
+  all.curvature.insert(all.curvature.end(), part.curvature.begin(), part.curvature.end());
+}
+
+void print_row(const std::string& name, Tally tally) {
+  std::vector<double>& curvature = tally.curvature;
+  std::sort(curvature.begin(), curvature.end());
+  fmt::print(
+      "{:12} {:5} {:5} {:5} {:6} {:5} {:9.1e} {:7.3f} {:8.2f} {:8.2f} {:7.3f} {:6.3f} {:7.3f}\n",
+      name, tally.count, tally.ok, tally.fair, tally.gentle, tally.first, tally.angle,
+      tally.jacobian, curvature.empty() ? 0 : curvature[curvature.size() / 2],
+      curvature.empty() ? 0 : curvature.back(), tally.distance, tally.moved,
+      tally.seconds / tally.count);
+  std::fflush(stdout);
+}
+
+Tally sweep(const JunctionClass& family, int count, std::uint64_t seed,
+            const std::string& directory) {
+  Random random(seed);
+  Tally tally;
+  tally.count = count;
   for (int k = 0; k < count; ++k) {
     const JunctionSpec spec = family.make(random);
     const double start = seconds_now();
     const Result<Junction> junction = make_junction(spec);
-    seconds += seconds_now() - start;
+    tally.seconds += seconds_now() - start;
     if (!junction) {
       fmt::print(stderr, "{} {}: {}\n", family.name, k, junction.error().message());
       continue;
     }
-    ++ok;
-    first += junction->attempts == 1;
-    fair += junction->fair;
-    angle = std::max(angle, junction->worst_angle_deg);
-    jacobian = std::min(jacobian, junction->jacobian_ratio);
-    distance = std::max(distance, junction->distance_over_radius);
-    moved = std::max(moved, junction->moved_over_radius);
-    curvature.push_back(junction->curvature_times_radius);
+    ++tally.ok;
+    tally.first += junction->attempts == 1;
+    tally.fair += junction->fair;
+    tally.gentle += junction->fair && junction->curvature_times_radius <= kGentle;
+    tally.angle = std::max(tally.angle, junction->worst_angle_deg);
+    tally.jacobian = std::min(tally.jacobian, junction->jacobian_ratio);
+    tally.distance = std::max(tally.distance, junction->distance_over_radius);
+    tally.moved = std::max(tally.moved, junction->moved_over_radius);
+    tally.curvature.push_back(junction->curvature_times_radius);
     if (!junction->fair) {
       fmt::print(stderr, "{} {}: not fair: curvature {:.3g}, distance {:.3g}\n", family.name, k,
                  junction->curvature_times_radius, junction->distance_over_radius);
     }
     if (!directory.empty()) dump(fmt::format("{}/{}_{}.txt", directory, family.name, k), *junction);
   }
-  std::sort(curvature.begin(), curvature.end());
-  fmt::print("{:12} {:5} {:5} {:5} {:6} {:9.1e} {:7.3f} {:8.2f} {:8.2f} {:7.3f} {:6.3f} {:7.3f}\n",
-             family.name, count, ok, fair, first, angle, jacobian,
-             curvature.empty() ? 0 : curvature[curvature.size() / 2],
-             curvature.empty() ? 0 : curvature.back(), distance, moved, seconds / count);
-  std::fflush(stdout);
+  return tally;
 }
 
 // Openings, target, topology and layout; and the solve: the first setting's, as make_junction runs
@@ -80,9 +119,8 @@ void time_stages(const JunctionClass& family, int count, std::uint64_t seed) {
     const double start = seconds_now();
     const auto plan = plan_openings(spec, {});
     if (!plan) continue;
-    std::vector<Vec3> directions;
-    for (const TargetBranch& b : plan->branches) directions.push_back(b.direction);
-    const JunctionTopology topology = junction_topology(directions, 5 * std::numbers::pi / 180);
+    const JunctionTopology topology =
+        junction_topology(plan->directions(), 5 * std::numbers::pi / 180);
     const JunctionTarget target(plan->branches, plan->blend, plan->rounding);
     const JunctionLayout layout = relaxed_layout(topology, target, plan->distances);
     const double middle = seconds_now();
@@ -104,14 +142,20 @@ int main(int argc, char** argv) {
   const std::string only = argc > 3 ? argv[3] : "";
   const std::string directory = argc > 4 ? argv[4] : "";
   const auto wanted = [&](const JunctionClass& family) {
-    return only.empty() || only == "all" || family.name == only;
+    return only.empty() || only == "all" || family.name == only ||
+           (only == "hard" && family.name != "ordinary");
   };
-  fmt::print("{:12} {:>5} {:>5} {:>5} {:>6} {:>9} {:>7} {:>8} {:>8} {:>7} {:>6} {:>7}\n", "class",
-             "count", "ok", "fair", "first", "angle", "jacob", "curv med", "curv max", "dist",
-             "moved", "s");
+  fmt::print("{:12} {:>5} {:>5} {:>5} {:>6} {:>5} {:>9} {:>7} {:>8} {:>8} {:>7} {:>6} {:>7}\n",
+             "class", "count", "ok", "fair", "gentle", "first", "angle", "jacob", "curv med",
+             "curv max", "dist", "moved", "s");
+  Tally all;
   for (const JunctionClass& family : junction_classes()) {
-    if (wanted(family)) sweep(family, count, seed, directory);
+    if (!wanted(family)) continue;
+    const Tally tally = sweep(family, count, seed, directory);
+    print_row(family.name, tally);
+    add(all, tally);
   }
+  if (all.count > count) print_row("all", all);
   for (const JunctionClass& family : junction_classes()) {
     if (wanted(family)) time_stages(family, std::min(count, 20), seed);
   }

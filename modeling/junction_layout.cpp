@@ -17,12 +17,16 @@ namespace {
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr int kCoarse = 5;
 constexpr int kFine = 9;
+constexpr double kLongestMove = 0.5;    // of a node in one sweep, in sides of the quads around it
+constexpr double kSettled = 0.01;       // moves in one sweep that are not worth another
+constexpr double kLeastEpsilon = 0.02;  // of area that distortion tells from none
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 double wrapped(double angle) { return angle - kTurn * std::round(angle / kTurn); }
 
-// Seams near the wanted azimuths whose sectors keep between half and twice their equal share.
+// Seams near the wanted azimuths whose sectors keep between half and twice
+// their equal share.
 std::vector<double> bounded_seams(const std::vector<double>& wanted) {
   const std::size_t count = wanted.size();
   const double share = kTurn / static_cast<double>(count);
@@ -52,7 +56,8 @@ std::vector<double> bounded_seams(const std::vector<double>& wanted) {
 }
 
 double azimuth(const OpeningFrame& frame, const Vec3& x) {
-  return std::atan2(frame.y.dot(x), frame.x.dot(x));
+  const Vec3 arm = x - frame.center;
+  return std::atan2(frame.y.dot(arm), frame.x.dot(arm));
 }
 
 std::vector<OpeningFrame> start_openings(const JunctionTopology& topology,
@@ -64,12 +69,16 @@ std::vector<OpeningFrame> start_openings(const JunctionTopology& topology,
     const TargetBranch& branch = target.branches()[b];
     OpeningFrame frame;
     frame.axis = branch.direction;
-    frame.center = distances[b] * branch.direction;
+    frame.center = branch.start + distances[b] * branch.direction;
     frame.radius = branch.radius;
-    const auto pole = [&](int patch) { return poles[at(topology.patches[at(patch)].from)]; };
-    const Vec3 first = pole(topology.sectors[b].front());
+    // Far enough out that a branch beside the centre sees it on the right side.
+    const double reach = branch.radius + branch.start.norm();
+    const auto pole = [&](int patch) -> Vec3 {
+      return reach * poles[at(topology.patches[at(patch)].from)];
+    };
+    const Vec3 first = pole(topology.sectors[b].front()) - frame.center;
     const Vec3 across = first - first.dot(frame.axis) * frame.axis;
-    frame.x = across.norm() > 1e-6 ? across.normalized() : frame.axis.unitOrthogonal();
+    frame.x = across.norm() > 1e-6 * reach ? across.normalized() : frame.axis.unitOrthogonal();
     frame.y = frame.axis.cross(frame.x);
     std::vector<double> wanted;
     for (const int patch : topology.sectors[b]) wanted.push_back(azimuth(frame, pole(patch)));
@@ -82,16 +91,31 @@ std::vector<OpeningFrame> start_openings(const JunctionTopology& topology,
 // Where a saddle crosses between its branches.
 struct Crossing {
   Vec3 direction;
-  double distance;  // of the crotch of the two cylinders, at most that of the nearer opening
+  double distance;  // of the crotch of the two cylinders, at most that of the
+                    // nearer opening
 };
 
-// The crotch of two cylinders lies at the angle beta from a with r_a / sin(beta) = r_b / sin(angle
-// - beta); a saddle that does not pass between its branches crosses in the middle of its Voronoi
-// arc.
+// The ray from the origin to a branch's opening, with its length.
+TargetBranch seen_from_origin(const JunctionTarget& target, int branch,
+                              const std::vector<double>& distances) {
+  TargetBranch seen = target.branches()[at(branch)];
+  seen.length = distances[at(branch)];
+  if (seen.start.isZero(0)) return seen;
+  const Vec3 opening = seen.start + seen.length * seen.direction;
+  seen.length = opening.norm();
+  seen.direction = opening / seen.length;
+  seen.start.setZero();
+  return seen;
+}
+
+// The crotch of two cylinders lies at the angle beta from a with r_a /
+// sin(beta) = r_b / sin(angle
+// - beta); a saddle that does not pass between its branches crosses in the
+// middle of its Voronoi arc.
 Crossing crossing(const JunctionTopology& topology, const JunctionTarget& target,
                   const JunctionSaddle& saddle, const std::vector<double>& distances) {
-  const TargetBranch& a = target.branches()[at(saddle.branch_a)];
-  const TargetBranch& b = target.branches()[at(saddle.branch_b)];
+  const TargetBranch a = seen_from_origin(target, saddle.branch_a, distances);
+  const TargetBranch b = seen_from_origin(target, saddle.branch_b, distances);
   const Vec3& from = topology.poles[at(saddle.from)].direction;
   const Vec3& to = topology.poles[at(saddle.to)].direction;
   const Vec3 edge = (b.direction - a.direction).normalized();
@@ -100,7 +124,7 @@ Crossing crossing(const JunctionTopology& topology, const JunctionTarget& target
   const Vec3 sum = a.direction + b.direction;
   const double angle = std::acos(std::clamp(a.direction.dot(b.direction), -1.0, 1.0));
   const double turn = std::atan2(side.dot(sum), from.dot(sum));
-  const double nearest = std::min(distances[at(saddle.branch_a)], distances[at(saddle.branch_b)]);
+  const double nearest = std::min(a.length, b.length);
   if (sum.norm() > 0.5 && turn > 0 && turn < arc) {
     const double raw =
         std::atan2(a.radius * std::sin(angle), b.radius + a.radius * std::cos(angle));
@@ -160,8 +184,9 @@ class Relaxation {
     place_openings();
   }
 
-  // Saddles run from pole to pole through their crossings, all lines between them and the openings
-  // straight, and everything is moved along rays from the centre onto the target.
+  // Saddles run from pole to pole through their crossings, all lines between
+  // them and the openings straight, and everything is moved along rays from the
+  // centre onto the target.
   void start(const std::vector<Vec3>& poles, const std::vector<Crossing>& crossings) {
     const int last = grid_.size() - 1;
     for (int p = 0; p < patch_count(); ++p) {
@@ -204,8 +229,9 @@ class Relaxation {
     }
   }
 
-  // Lengths of the quads' sides that the mesh aims at: those of its legs, saddles and openings now,
-  // none shorter than half a radius, so that no patch dwindles.
+  // Lengths of the quads' sides that the mesh aims at: those of its legs,
+  // saddles and openings now, none shorter than half a radius, so that no patch
+  // dwindles.
   void set_lengths() {
     const int last = grid_.size() - 1;
     const auto length = [&](int p, bool along_u, int line) {
@@ -233,8 +259,11 @@ class Relaxation {
     }
   }
 
-  void sweep(double epsilon) {
-    for (const int node : movable_) improve(node, epsilon);
+  // The farthest that a node moved, in sides of the quads around it.
+  double sweep(double epsilon) {
+    double farthest = 0;
+    for (const int node : movable_) farthest = std::max(farthest, improve(node, epsilon));
+    return farthest;
   }
 
   // Part of the way to where the legs arrive.
@@ -318,9 +347,10 @@ class Relaxation {
     }
   }
 
-  // The distortion of the quads around a node, were it at x: at each corner the mean of the squared
-  // sides over their aimed lengths, plus an area term, over the signed area, which is kept from
-  // zero by epsilon (Garanzha et al. 2021, "Foldover-free maps in 50 lines of code").
+  // The distortion of the quads around a node, were it at x: at each corner the
+  // mean of the squared sides over their aimed lengths, plus an area term, over
+  // the signed area, which is kept from zero by epsilon (Garanzha et al. 2021,
+  // "Foldover-free maps in 50 lines of code").
   struct Distortion {
     double value = 0;
     Vec3 gradient = Vec3::Zero();
@@ -377,8 +407,9 @@ class Relaxation {
     return sum;
   }
 
-  // One Newton step in the tangent plane, shortened until it helps.
-  void improve(int node, double epsilon) {
+  // One Newton step in the tangent plane, shortened until it helps; its length
+  // in sides.
+  double improve(int node, double epsilon) {
     const Vec3 x = nodes_.col(node);
     const Vec3 n = normals_.col(node);
     const Distortion now = distortion<true>(node, x, epsilon);
@@ -393,16 +424,20 @@ class Relaxation {
     const double shift = std::max(0.0, 0.05 * (std::abs(middle) + apart) - (middle - apart));
     H.diagonal().array() += shift;
     Vec3 move = -(plane * H.inverse() * g);
-    const double most = 0.5 * shortest_side(node);
-    const double length = move.norm();
-    if (!(length > 0)) return;
-    if (length > most) move *= most / length;
-    for (int attempt = 0; attempt < 4; ++attempt, move /= 3) {
+    const double side = shortest_side(node);
+    double length = move.norm() / side;
+    if (!(length > 0)) return 0;
+    if (length > kLongestMove) {
+      move *= kLongestMove / length;
+      length = kLongestMove;
+    }
+    for (int attempt = 0; attempt < 4; ++attempt, move /= 3, length /= 3) {
       if (distortion<false>(node, x + move, epsilon).value < now.value) {
         step_back(node, x + move);
-        return;
+        return length;
       }
     }
+    return 0;
   }
 
   // Of the aimed lengths around a node.
@@ -445,7 +480,7 @@ JunctionLayout relaxed_layout(const JunctionTopology& topology, const JunctionTa
   double epsilon = 0.5;
   for (int k = 0; k < options.coarse_sweeps; ++k) {
     coarse.sweep(epsilon);
-    epsilon = std::max(0.02, 0.85 * epsilon);
+    epsilon = std::max(kLeastEpsilon, 0.85 * epsilon);
     if (k % 8 == 7 && options.follow > 0) coarse.follow_legs();
     if (k % 10 == 9) coarse.set_lengths();
   }
@@ -453,7 +488,9 @@ JunctionLayout relaxed_layout(const JunctionTopology& topology, const JunctionTa
   Relaxation fine(topology, target, options, kFine, start.openings);
   fine.start_from(start);
   fine.set_lengths();
-  for (int k = 0; k < options.fine_sweeps; ++k) fine.sweep(0.02);
+  for (int k = 0; k < options.fine_sweeps; ++k) {
+    if (fine.sweep(kLeastEpsilon) < kSettled) break;
+  }
   return std::move(fine).result();
 }
 

@@ -28,6 +28,7 @@ constexpr double kFairCurvature = 20;
 constexpr double kFairDistance = 0.5;
 constexpr double kGoodAngleDeg = 1e-6;
 constexpr double kGoodCurvature = 8;  // gentle enough whatever the target
+constexpr double kGoodOffTarget = 0.15;
 constexpr double kSharperThanTarget = 1.2;
 constexpr double kStep = 1e-4;  // of differences of normals, in smallest radii
 
@@ -227,10 +228,17 @@ bool is_fair(const JunctionQuality& q) {
          q.distance_to_union < kFairDistance;
 }
 
-bool is_faithful(const JunctionQuality& q) {
-  return is_fair(q) && q.worst_angle_deg <= kGoodAngleDeg &&
+double departure(const JunctionQuality& q) {
+  if (!is_fair(q)) {
+    return std::max(q.curvature_times_radius / kFairCurvature, q.distance_to_union / kFairDistance);
+  }
+  return std::max(q.curvature_times_radius / kGoodCurvature, q.off_target / kGoodOffTarget);
+}
+
+bool is_faithful(const JunctionQuality& q, double most) {
+  return is_fair(q) && q.worst_angle_deg <= kGoodAngleDeg && q.off_target <= kGoodOffTarget &&
          q.curvature_times_radius <=
-             std::max(kGoodCurvature, kSharperThanTarget * q.target_curvature);
+             (q.target_curvature > most ? kSharperThanTarget * q.target_curvature : most);
 }
 
 std::string failed_gate(const JunctionQuality& q) {

@@ -35,8 +35,12 @@ Points3 junction_normals(const JunctionTopology& topology, const JunctionNet& ne
 bool is_sound(const JunctionQuality& quality);
 bool is_fair(const JunctionQuality& quality);
 
-// Fair and not notably sharper than the target: a further try could hardly be better.
-bool is_faithful(const JunctionQuality& quality);
+// Of a fair surface: the larger of curvature and distance from the target, each over what is good;
+// of others: the larger of curvature and distance from the cylinders, each over what is fair.
+double departure(const JunctionQuality& quality);
+
+// Fair, near its target and not notably sharper: a further try could hardly be better.
+bool is_faithful(const JunctionQuality& quality, double most_curvature_times_radius);
 
 // The first gate the surface does not pass, with value and limit; empty when it is sound.
 std::string failed_gate(const JunctionQuality& quality);

@@ -31,7 +31,7 @@ KktSystem::KktSystem(int unknowns, int equations, const std::vector<Place>& hess
     jacobian_.push_back(find(unknowns + row, column));
   }
   for (int k = 0; k < unknowns + equations; ++k) diagonal_.push_back(find(k, k));
-  factor_.analyzePattern(matrix_);
+  factor_.emplace(matrix_);
 }
 
 void KktSystem::clear() { std::fill(values_, values_ + matrix_.nonZeros(), 0.0); }
@@ -44,14 +44,13 @@ bool KktSystem::factor(double epsilon) {
   for (int k = 0; k < equations_; ++k) {
     values_[diagonal_[static_cast<std::size_t>(unknowns_ + k)]] = -epsilon;
   }
-  factor_.factorize(matrix_);
-  return factor_.info() == Eigen::Success;
+  return factor_->factor(matrix_);
 }
 
 Eigen::VectorXd KktSystem::solve(const Eigen::VectorXd& right) const {
-  Eigen::VectorXd x = factor_.solve(right);
+  Eigen::VectorXd x = factor_->solve(right);
   const Eigen::VectorXd rest = right - matrix_.selfadjointView<Eigen::Lower>() * x;
-  x += factor_.solve(rest);
+  x += factor_->solve(rest);
   return x;
 }
 

@@ -1,11 +1,13 @@
 // The sparse symmetric system of a constrained least squares step, its pattern analysed once.
 #pragma once
 
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+
+#include "modeling/frontal_factor.h"
 
 namespace angiospline {
 
@@ -42,7 +44,7 @@ class KktSystem {
   std::vector<std::size_t> hessian_;
   std::vector<std::size_t> jacobian_;
   std::vector<std::size_t> diagonal_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor_;
+  std::optional<FrontalFactor> factor_;
 };
 
 }  // namespace angiospline

@@ -17,7 +17,8 @@
 namespace angiospline {
 namespace {
 
-// One set of choices; blend and rounding are relative to those of the plan.
+// One set of choices; blend and rounding are relative to those of the plan, the
+// anchor to the usual one.
 struct Setting {
   double blend = 1.0;
   double rounding = 1.0;
@@ -25,26 +26,40 @@ struct Setting {
   double merge_deg = 5.0;
   double follow = 0.5;
   int sweeps = 60;
+  double anchor = 1.0;
 };
 
-constexpr std::array<Setting, 13> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60},
-                                           {1.5, 1.3, 0.5, 5.0, 0.5, 60},
-                                           {1.5, 1.3, 0.5, 5.0, 0.0, 8},
-                                           {1.0, 1.0, 1.5, 5.0, 0.5, 60},
-                                           {1.0, 1.0, 0.5, 10.0, 0.5, 60},
-                                           {1.0, 1.0, 0.5, 5.0, 0.0, 8},
-                                           {1.5, 1.5, 0.2, 10.0, 0.0, 60},
-                                           {0.7, 1.0, 1.0, 2.0, 0.5, 30},
-                                           {1.0, 1.5, 0.1, 5.0, 0.5, 60},
-                                           {2.0, 2.0, 0.5, 5.0, 0.0, 20},
-                                           {1.5, 1.3, 1.5, 15.0, 0.5, 60},
-                                           {1.2, 1.2, 0.5, 15.0, 0.0, 30},
-                                           {0.8, 1.2, 1.5, 5.0, 0.0, 120}}};
-constexpr int kMoreTries = 3;  // for a fair surface that is sharper than its target
+constexpr std::array<Setting, 16> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60, 1},
+                                           {1.0, 1.0, 0.5, 5.0, 0.5, 60, 10},
+                                           {1.5, 1.3, 0.5, 5.0, 0.5, 60, 0.1},
+                                           {2.0, 1.6, 0.5, 5.0, 0.5, 60, 3},
+                                           {3.0, 2.0, 0.5, 5.0, 0.5, 60, 1},
+                                           {1.5, 1.3, 0.5, 5.0, 0.0, 8, 1},
+                                           {1.0, 1.0, 1.5, 5.0, 0.5, 60, 1},
+                                           {1.0, 1.0, 0.5, 10.0, 0.5, 60, 3},
+                                           {1.0, 1.0, 0.5, 5.0, 0.0, 8, 3},
+                                           {1.5, 1.5, 0.2, 10.0, 0.0, 60, 1},
+                                           {0.7, 1.0, 1.0, 2.0, 0.5, 30, 3},
+                                           {1.0, 1.5, 0.1, 5.0, 0.5, 60, 1},
+                                           {2.0, 2.0, 0.5, 5.0, 0.0, 20, 10},
+                                           {1.5, 1.3, 1.5, 15.0, 0.5, 60, 1},
+                                           {1.2, 1.2, 0.5, 15.0, 0.0, 30, 3},
+                                           {0.8, 1.2, 1.5, 5.0, 0.0, 120, 1}}};
+// Curvature times smallest radius that is gentle enough; where many branches meet a try takes long.
+constexpr double kGentle = 8;
+constexpr double kGentleOfMany = 10;
+constexpr int kMoreTries = 4;  // for a fair surface that is sharper than its target
+
+// What comes before the solve.
+struct Draft {
+  JunctionTopology topology;
+  JunctionTarget target;
+  JunctionLayout layout;
+};
 
 struct Attempt {
   JunctionTopology topology;
-  JunctionLayout layout;
+  std::vector<OpeningFrame> openings;
   JunctionNet net;
   JunctionQuality quality;
 };
@@ -52,25 +67,33 @@ struct Attempt {
 // Of two sound surfaces.
 bool is_better(const JunctionQuality& a, const JunctionQuality& b) {
   if (is_fair(a) != is_fair(b)) return is_fair(a);
-  return a.curvature_times_radius < b.curvature_times_radius;
+  return departure(a) < departure(b);
 }
 
-Attempt attempt(const OpeningPlan& plan, const Setting& setting,
-                const SmoothingWeights& weights = {}) {
-  std::vector<Vec3> directions;
-  for (const TargetBranch& b : plan.branches) directions.push_back(b.direction);
+// They differ in the solve alone.
+bool share_draft(const Setting& a, const Setting& b) {
+  return a.blend == b.blend && a.rounding == b.rounding && a.area_weight == b.area_weight &&
+         a.merge_deg == b.merge_deg && a.follow == b.follow && a.sweeps == b.sweeps;
+}
+
+Draft make_draft(const OpeningPlan& plan, const Setting& setting) {
   JunctionTopology topology =
-      junction_topology(directions, setting.merge_deg * std::numbers::pi / 180);
-  const JunctionTarget target(plan.branches, setting.blend * plan.blend,
-                              setting.rounding * plan.rounding);
-  LayoutOptions layout_options;
-  layout_options.area_weight = setting.area_weight;
-  layout_options.follow = setting.follow;
-  layout_options.coarse_sweeps = setting.sweeps;
-  const JunctionLayout layout = relaxed_layout(topology, target, plan.distances, layout_options);
-  SmoothedNet smooth = smooth_junction(topology, target, layout, weights);
-  const JunctionQuality quality = junction_quality(topology, target, smooth.net);
-  return {std::move(topology), layout, std::move(smooth.net), quality};
+      junction_topology(plan.directions(), setting.merge_deg * std::numbers::pi / 180);
+  JunctionTarget target(plan.branches, setting.blend * plan.blend,
+                        setting.rounding * plan.rounding);
+  LayoutOptions options;
+  options.area_weight = setting.area_weight;
+  options.follow = setting.follow;
+  options.coarse_sweeps = setting.sweeps;
+  JunctionLayout layout = relaxed_layout(topology, target, plan.distances, options);
+  return {std::move(topology), std::move(target), std::move(layout)};
+}
+
+Attempt attempt(const Draft& draft, const Setting& setting, SmoothingWeights weights = {}) {
+  weights.energy.anchor *= setting.anchor;
+  SmoothedNet smooth = smooth_junction(draft.topology, draft.target, draft.layout, weights);
+  const JunctionQuality quality = junction_quality(draft.topology, draft.target, smooth.net);
+  return {draft.topology, draft.layout.openings, std::move(smooth.net), quality};
 }
 
 SurfaceNetwork make_network(const JunctionSpec& spec, const OpeningPlan& plan,
@@ -102,7 +125,7 @@ Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const At
   Junction junction;
   junction.network = make_network(spec, plan, best.topology, best.net);
   for (std::size_t b = 0; b < spec.branches.size(); ++b) {
-    const OpeningFrame& frame = best.layout.openings[b];
+    const OpeningFrame& frame = best.openings[b];
     JunctionOpening opening;
     opening.axis = frame.axis;
     opening.center_mm = spec.center_mm + plan.unit_mm * frame.center;
@@ -129,18 +152,23 @@ Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& 
   if (!plan) return fail(plan.error());
   std::optional<Attempt> best;  // a fair one, otherwise a sound one, otherwise none
   std::string why;
+  const double most_curvature = spec.branches.size() == 3 ? kGentle : kGentleOfMany;
   int attempts = 0;
   int more = kMoreTries;
+  std::optional<Draft> draft;
+  const Setting* before = nullptr;
   for (const Setting& setting : kLadder) {
     if (progress.should_stop()) return fail(cancelled("junction " + spec.name));
     if (best && is_fair(best->quality) && more-- == 0) break;
     ++attempts;
-    Attempt now = attempt(*plan, setting);
+    if (before == nullptr || !share_draft(*before, setting)) draft = make_draft(*plan, setting);
+    before = &setting;
+    Attempt now = attempt(*draft, setting);
     if (why.empty()) why = failed_gate(now.quality);
     if (is_sound(now.quality) && (!best || is_better(now.quality, best->quality))) {
       best = std::move(now);
     }
-    if (best && is_faithful(best->quality)) break;
+    if (best && is_faithful(best->quality, most_curvature)) break;
   }
   if (best) return make_result(spec, *plan, *best, attempts);
   std::string names;
@@ -155,7 +183,8 @@ Result<Junction> make_rough_junction(const JunctionSpec& spec, const JunctionOpt
   if (!plan) return fail(plan.error());
   SmoothingWeights weights;
   weights.degrees.leg = 0;
-  return make_result(spec, *plan, attempt(*plan, kLadder.front(), weights), 1);
+  return make_result(spec, *plan,
+                     attempt(make_draft(*plan, kLadder.front()), kLadder.front(), weights), 1);
 }
 
 }  // namespace angiospline

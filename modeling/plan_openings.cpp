@@ -16,6 +16,7 @@ constexpr double kLeastMargin = 0.3;    // radii
 constexpr double kLeastAngleRad = 1.0 * std::numbers::pi / 180;
 constexpr double kUnitTolerance = 1e-6;  // of a direction's length
 constexpr int kCirclePoints = 24;
+constexpr double kReach = 4;  // largest radii at which directions of offset branches are compared
 constexpr std::size_t kMostBranches = 24;  // what JunctionTarget holds
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -40,11 +41,20 @@ std::optional<Error> find_branch_defect(const JunctionSpec& spec, std::size_t b)
     return Error{ErrorKind::kBadInput, "direction is not a unit vector", where,
                  fmt::format("length {}", length), "directions have length 1"};
   }
+  if (!branch.offset_mm.allFinite()) {
+    return Error{ErrorKind::kBadInput, "offset is not finite", where, {}, {}};
+  }
   if (std::isnan(branch.longest_mm) || branch.longest_mm < 0) {
     return Error{ErrorKind::kBadInput, "longest distance of an opening is negative", where,
                  fmt::format("{}", branch.longest_mm), "zero or more, zero for no bound"};
   }
   return std::nullopt;
+}
+
+// Where a branch is going: exactly its direction if it begins in the centre.
+Vec3 seen_from_center(const JunctionBranch& branch, double reach_mm) {
+  if (branch.offset_mm.isZero(0)) return branch.direction;
+  return (branch.offset_mm + reach_mm * branch.direction).normalized();
 }
 
 std::optional<Error> find_spec_defect(const JunctionSpec& spec) {
@@ -62,10 +72,12 @@ std::optional<Error> find_spec_defect(const JunctionSpec& spec) {
   for (std::size_t b = 0; b < spec.branches.size(); ++b) {
     if (auto error = find_branch_defect(spec, b)) return error;
   }
+  double reach = 0;
+  for (const JunctionBranch& b : spec.branches) reach = std::max(reach, kReach * b.radius_mm);
   for (std::size_t a = 0; a < spec.branches.size(); ++a) {
     for (std::size_t b = a + 1; b < spec.branches.size(); ++b) {
-      const Vec3& d = spec.branches[a].direction;
-      const Vec3& e = spec.branches[b].direction;
+      const Vec3 d = seen_from_center(spec.branches[a], reach);
+      const Vec3 e = seen_from_center(spec.branches[b], reach);
       const double angle = std::atan2(d.cross(e).norm(), d.dot(e));
       if (angle >= kLeastAngleRad) continue;
       return Error{ErrorKind::kBadInput, "two branches in the same direction", junction_name(spec),
@@ -77,6 +89,15 @@ std::optional<Error> find_spec_defect(const JunctionSpec& spec) {
   return std::nullopt;
 }
 
+// The distance along a branch, from where it begins, of its point this far from
+// the centre.
+double along_branch(const Vec3& offset, const Vec3& direction, double distance) {
+  if (offset.isZero(0)) return distance;
+  const double back = offset.dot(direction);
+  const double rest = back * back - offset.squaredNorm() + distance * distance;
+  return rest > 0 ? std::max(0.0, std::sqrt(rest) - back) : 0.0;
+}
+
 double share_around(const JunctionTarget& target, int b, double distance) {
   const TargetBranch& branch = target.branches()[at(b)];
   const Vec3 x = branch.direction.unitOrthogonal();
@@ -84,15 +105,16 @@ double share_around(const JunctionTarget& target, int b, double distance) {
   double worst = 0;
   for (int k = 0; k < kCirclePoints; ++k) {
     const double phi = 2 * std::numbers::pi * k / kCirclePoints;
-    const Vec3 p =
-        distance * branch.direction + branch.radius * (std::cos(phi) * x + std::sin(phi) * y);
+    const Vec3 p = branch.start + distance * branch.direction +
+                   branch.radius * (std::cos(phi) * x + std::sin(phi) * y);
     worst = std::max(worst, target.others_share(b, p));
   }
   return worst;
 }
 
-// The least distance beyond which the others' share is small. Branches diverge, so the share falls
-// once it has begun to; the search comes inward from a distance at which it is certainly small.
+// The least distance beyond which the others' share is small. Branches diverge,
+// so the share falls once it has begun to; the search comes inward from a
+// distance at which it is certainly small.
 double blend_end(const JunctionTarget& target, int b) {
   const TargetBranch& branch = target.branches()[at(b)];
   double far = branch.radius;
@@ -109,13 +131,27 @@ double blend_end(const JunctionTarget& target, int b) {
 
 }  // namespace
 
+Vec3 place_on_branch_mm(const JunctionBranch& branch, double distance_mm) {
+  return branch.offset_mm +
+         along_branch(branch.offset_mm, branch.direction, distance_mm) * branch.direction;
+}
+
+std::vector<Vec3> OpeningPlan::directions() const {
+  std::vector<Vec3> all;
+  for (std::size_t b = 0; b < branches.size(); ++b) {
+    all.push_back(branches[b].start.isZero(0) ? branches[b].direction : opening(b).normalized());
+  }
+  return all;
+}
+
 Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOptions& options) {
   if (auto error = find_spec_defect(spec)) return fail(*error);
   OpeningPlan plan;
   plan.unit_mm = 0;
   for (const JunctionBranch& b : spec.branches) plan.unit_mm = std::max(plan.unit_mm, b.radius_mm);
   for (const JunctionBranch& b : spec.branches) {
-    plan.branches.push_back({b.direction.normalized(), b.radius_mm / plan.unit_mm});
+    plan.branches.push_back(
+        {b.direction.normalized(), b.radius_mm / plan.unit_mm, b.offset_mm / plan.unit_mm, 0.0});
   }
   Error too_short;
   for (const double part : {1.0, 0.75, 0.5, 1.0 / 3}) {
@@ -127,9 +163,11 @@ Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOption
     for (std::size_t b = 0; b < spec.branches.size() && fits; ++b) {
       const double r = plan.branches[b].radius;
       const double end = blend_end(target, static_cast<int>(b));
-      const double longest = spec.branches[b].longest_mm / plan.unit_mm;
+      const TargetBranch& branch = plan.branches[b];
+      const double longest =
+          along_branch(branch.start, branch.direction, spec.branches[b].longest_mm / plan.unit_mm);
       double distance = end + options.margin * r;
-      if (longest > 0) distance = std::min(distance, longest);
+      if (spec.branches[b].longest_mm > 0) distance = std::min(distance, longest);
       if (distance < end + std::min(kLeastMargin, options.margin) * r) {
         fits = false;
         too_short = Error{
@@ -150,7 +188,11 @@ Result<std::vector<double>> opening_distances_mm(const JunctionSpec& spec,
   const Result<OpeningPlan> plan = plan_openings(spec, options);
   if (!plan) return fail(plan.error());
   std::vector<double> distances;
-  for (const double d : plan->distances) distances.push_back(d * plan->unit_mm);
+  for (std::size_t b = 0; b < spec.branches.size(); ++b) {
+    const bool centered = plan->branches[b].start.isZero(0);
+    const double distance = centered ? plan->distances[b] : plan->opening(b).norm();
+    distances.push_back(distance * plan->unit_mm);
+  }
   return distances;
 }
 

@@ -46,22 +46,40 @@ bool same(const JunctionSpec& a, const JunctionSpec& b) {
   for (std::size_t k = 0; k < a.branches.size(); ++k) {
     const JunctionBranch& x = a.branches[k];
     const JunctionBranch& y = b.branches[k];
-    if (x.direction != y.direction || x.radius_mm != y.radius_mm || x.longest_mm != y.longest_mm) {
+    if (x.direction != y.direction || x.radius_mm != y.radius_mm || x.longest_mm != y.longest_mm ||
+        x.offset_mm != y.offset_mm) {
       return false;
     }
   }
   return true;
 }
 
-// The junction with the options asked for; if that fails, with openings farther out.
+// The same with all branches taken for rays from the centre to where they are wanted.
+JunctionSpec centered(const PlannedNode& node) {
+  JunctionSpec spec = node.spec;
+  for (std::size_t k = 0; k < spec.branches.size(); ++k) {
+    JunctionBranch& branch = spec.branches[k];
+    branch.direction = place_on_branch_mm(branch, node.wanted_mm[k]).normalized();
+    branch.offset_mm.setZero();
+  }
+  return spec;
+}
+
+// The junction with the options asked for; if that fails, with openings farther out; if its
+// branches do not meet in a point, then as if they did.
 BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& options,
                              const Progress& progress) {
   BuiltJunction built{node.spec, {}, node.error};
   if (node.error) return built;
-  for (const double margin : {1.0, 1.6}) {
+  const bool is_centered =
+      std::all_of(node.spec.branches.begin(), node.spec.branches.end(),
+                  [](const JunctionBranch& b) { return b.offset_mm.isZero(0); });
+  for (const double margin : {1.0, 1.6, 0.0}) {
+    if (margin == 0 && is_centered) break;
     JunctionOptions tried = options;
-    tried.margin *= margin;
-    Result<Junction> junction = make_junction(node.spec, tried, progress);
+    if (margin > 0) tried.margin *= margin;
+    Result<Junction> junction =
+        make_junction(margin > 0 ? node.spec : centered(node), tried, progress);
     if (junction) {
       built.junction = std::move(*junction);
       built.error.reset();

@@ -372,7 +372,7 @@ double SeedPlan::bend_of(int b) const {
     const PlannedNode& node = node_at(end);
     if (!node.is_junction() || node.error) return 0.0;
     const JunctionBranch& opening = node.spec.branches[index(slot_of(end))];
-    place[at_end] = node.center_mm + planned_mm(end) * opening.direction;
+    place[at_end] = node.center_mm + place_on_branch_mm(opening, planned_mm(end));
     along[at_end] = at_end ? Vec3(-opening.direction) : opening.direction;
     radius = std::max(radius, opening.radius_mm);
   }

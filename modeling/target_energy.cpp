@@ -32,6 +32,24 @@ Eigen::MatrixXd second_difference_matrix() {
   return R;
 }
 
+// Half the mean length of the layout's lines across a patch, in the direction where they are
+// longer.
+double patch_extent(const JunctionLayout& layout, int patch) {
+  const int last = layout.grid.size() - 1;
+  const auto node = [&](int i, int j) -> Vec3 {
+    return layout.nodes.col(layout.grid.at(patch, i, j));
+  };
+  double along_u = 0;
+  double along_v = 0;
+  for (int line = 0; line <= last; ++line) {
+    for (int k = 0; k < last; ++k) {
+      along_u += (node(k + 1, line) - node(k, line)).norm();
+      along_v += (node(line, k + 1) - node(line, k)).norm();
+    }
+  }
+  return std::max(along_u, along_v) / (2 * (last + 1));
+}
+
 }  // namespace
 
 TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarget* target,
@@ -76,6 +94,13 @@ TargetEnergy::TargetEnergy(const JunctionTopology& topology, const JunctionTarge
         scale(s) = (1 - u) * own + u * least;
       }
     }
+    // A long patch's parameters are looser: its anchor gives way with the fourth power of its
+    // extent.
+    const double extent = patch_extent(layout, p);
+    anchor_scales_.push_back(scale.unaryExpr([extent](double r) {
+      const double longer = std::max(1.0, extent / r);
+      return r * longer * longer;
+    }));
     scales_.push_back(std::move(scale));
     PatchModel& model = models_[at(p)];
     for (int k = 0; k < kPoints; ++k) {
@@ -126,7 +151,7 @@ void TargetEnergy::update_patch(int p, const JunctionNet& net, const EnergyWeigh
     residual(3 * s) = on_distance * foot.distance;
     residual(3 * s + 1) = on_u * foot.normal.dot(Su.col(s));
     residual(3 * s + 2) = on_v * foot.normal.dot(Sv.col(s));
-    anchor_weight(s) = weights.anchor * sample_weights_(s) / (scale(s) * scale(s));
+    anchor_weight(s) = weights.anchor * sample_weights_(s) / std::pow(anchor_scales_[at(p)](s), 2);
   }
   Eigen::MatrixXd J(count, 3 * samples);
   Eigen::Index row = 0;

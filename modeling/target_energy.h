@@ -17,7 +17,7 @@ namespace angiospline {
 struct EnergyWeights {
   double distance = 10.0;    // from the target
   double tangent = 1.0;      // sines between Su, Sv and the target's tangent plane
-  double anchor = 0.01;      // from the layout's node of the same parameters
+  double anchor = 0.3;       // from the layout's node of the same parameters; less on long patches
   double roughness = 0.003;  // second differences of the control net
   double pole = 4.0;         // of samples beside a pole, against 1 elsewhere
 };
@@ -52,8 +52,9 @@ class TargetEnergy {
   const JunctionTarget* target_;
   const JunctionLayout& layout_;
   std::vector<PatchModel> models_;
-  std::vector<Eigen::VectorXd> scales_;  // local radius at each sample of a patch
-  Eigen::MatrixXd b_, bu_, bv_;          // 36 x samples
+  std::vector<Eigen::VectorXd> scales_;         // local radius at each sample of a patch
+  std::vector<Eigen::VectorXd> anchor_scales_;  // and what distances from the anchor are divided by
+  Eigen::MatrixXd b_, bu_, bv_;                 // 36 x samples
   Eigen::VectorXd sample_weights_;
   std::vector<char> beside_pole_;  // whether a sample is a pole or next to one
   Eigen::MatrixXd roughness_;      // 36 x 36

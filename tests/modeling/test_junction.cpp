@@ -110,6 +110,30 @@ TEST(MakeJunction, IsSmoothForRandomDirectionsAndRadii) {
   EXPECT_GE(made, 11);
 }
 
+// Two junctions that became one: each branch keeps its own axis.
+TEST(MakeJunction, TakesBranchesThatDoNotMeetInAPoint) {
+  JunctionSpec spec =
+      spec_of({{-1, 0.2, 0}, {-0.3, -1, 0.2}, {1, 0.3, 0.1}, {0.4, 0.2, 1}}, {1.0, 0.7, 0.8, 0.6});
+  for (const std::size_t b : {0U, 1U}) spec.branches[b].offset_mm = Vec3(-0.7, 0, 0);
+  for (const std::size_t b : {2U, 3U}) spec.branches[b].offset_mm = Vec3(0.7, 0, 0);
+  const Result<Junction> junction = make_junction(spec);
+  ASSERT_TRUE(junction) << junction.error().message();
+  expect_lawful(spec, *junction);
+  EXPECT_TRUE(junction->fair);
+  const auto distances = opening_distances_mm(spec);
+  ASSERT_TRUE(distances);
+  for (std::size_t b = 0; b < 4; ++b) {
+    const JunctionBranch& branch = spec.branches[b];
+    const Vec3 arm = junction->openings[b].center_mm - branch.offset_mm;
+    EXPECT_LT(arm.cross(branch.direction).norm(), 1e-12);
+    EXPECT_GT(arm.dot(branch.direction), 0);
+    EXPECT_NEAR(junction->openings[b].center_mm.norm(), (*distances)[b], 1e-12);
+    EXPECT_LT(
+        (place_on_branch_mm(branch, (*distances)[b]) - junction->openings[b].center_mm).norm(),
+        1e-9);
+  }
+}
+
 TEST(MakeJunction, GrowsWithItsSpec) {
   JunctionSpec large = y_spec();
   for (JunctionBranch& b : large.branches) b.radius_mm *= 1000;
@@ -174,6 +198,14 @@ TEST(MakeJunction, RefusesBadSpecsNamingTheJunctionAndTheBranch) {
   spec = y_spec();
   spec.center_mm.x() = std::numeric_limits<double>::infinity();
   refuses(spec, "centre is not finite", "");
+  // Directions that span no plane: of three on one line two are the same.
+  spec = y_spec();
+  spec.branches[1].direction = -spec.branches[0].direction;
+  spec.branches[2].direction = spec.branches[0].direction;
+  refuses(spec, "same direction", "b0 and b2");
+  spec = y_spec();
+  spec.branches[1].offset_mm.y() = std::numeric_limits<double>::quiet_NaN();
+  refuses(spec, "offset is not finite", "b1");
   for (const std::size_t count : {0U, 1U, 2U}) {
     spec = y_spec();
     spec.branches.resize(count);

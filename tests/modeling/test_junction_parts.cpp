@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "modeling/frontal_factor.h"
 #include "modeling/junction_target.h"
 #include "modeling/junction_topology.h"
 #include "modeling/opening_arcs.h"
@@ -119,6 +120,72 @@ TEST(JunctionTarget, HasTheGradientOfItsValue) {
       }
       EXPECT_LT((difference - v.gradient).norm(), 1e-6 * (1 + v.gradient.norm()));
     }
+  }
+}
+
+TEST(JunctionTarget, WithCoresHasTheGradientOfItsValueAndHoldsTheCoresInside) {
+  Random random(10);
+  for (int trial = 0; trial < 10; ++trial) {
+    std::vector<TargetBranch> branches;
+    const Vec3 place(random.uniform(0.5, 1.5), 0, 0);
+    for (const Vec3& d : random_directions(4, random)) {
+      const bool right = d.x() > 0;
+      branches.push_back({d, random.uniform(0.4, 1.0), right ? place : Vec3::Zero(), 0.0});
+    }
+    branches[0].start = place;
+    const JunctionTarget target(branches, 0.15, 0.09);
+    EXPECT_EQ(target.branches().size(), 5u);
+    EXPECT_LT(target.at(0.5 * place).value, 0);
+    for (int k = 0; k < 20; ++k) {
+      const Vec3 x(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2));
+      const JunctionTarget::Value v = target.at(x);
+      Vec3 difference;
+      for (int d = 0; d < 3; ++d) {
+        const Vec3 h = 1e-6 * Vec3::Unit(d);
+        difference(d) = (target.at(x + h).value - target.at(x - h).value) / 2e-6;
+      }
+      EXPECT_LT((difference - v.gradient).norm(), 1e-6 * (1 + v.gradient.norm()));
+      const Vec3 on = target.on_ray(x.normalized(), 20);
+      if (on.norm() < 19) {
+        EXPECT_LT(std::abs(target.foot(on).distance), 1e-4);
+      }
+    }
+  }
+}
+
+TEST(FrontalFactor, SolvesQuasiDefiniteSystemsLikeADenseSolver) {
+  Random random(4);
+  for (const int size : {1, 7, 60, 400}) {
+    // Blocks of overlapping rows, as patches that share edges give them, and equations on some.
+    const int equations = size / 3;
+    Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(size + equations, size + equations);
+    for (int first = 0; first < size; first += 5) {
+      const int count = std::min(12, size - first);
+      Eigen::MatrixXd A(count, count);
+      for (double& a : A.reshaped()) a = random.gaussian();
+      dense.block(first, first, count, count) += A * A.transpose();
+      dense.block(first, first, count, count).diagonal().array() += 0.1;
+    }
+    for (int e = 0; e < equations; ++e) {
+      dense(size + e, size + e) = -1e-3;
+      for (int k = 0; k < 4; ++k) dense(size + e, random.below(size)) = random.gaussian();
+    }
+    dense.triangularView<Eigen::StrictlyUpper>() = dense.transpose();
+    Eigen::SparseMatrix<double> lower = dense.sparseView();
+    lower = Eigen::SparseMatrix<double>(lower.triangularView<Eigen::Lower>());
+    lower.makeCompressed();
+    FrontalFactor factor(lower);
+    for (const double scale : {1.0, 3.0}) {
+      lower.coeffs() *= scale;
+      dense *= scale;
+      ASSERT_TRUE(factor.factor(lower));
+      Eigen::VectorXd x(size + equations);
+      for (double& v : x) v = random.gaussian();
+      const Eigen::VectorXd right = dense * x;
+      EXPECT_LT((factor.solve(right) - x).norm(), 1e-7 * x.norm()) << size;
+    }
+    lower.coeffs().setZero();
+    EXPECT_FALSE(factor.factor(lower));
   }
 }
 

@@ -251,6 +251,51 @@ TEST(SeedModel, JunctionsTooNearEachOtherBecomeOneAndSaySo) {
   expect_smooth(model->network);
 }
 
+// A trunk with two forks; `spoil` makes the second one impossible.
+Result<Model> forked_tree(const std::function<void(TreeMaker&, int)>& spoil) {
+  TreeMaker maker;
+  const int root = maker.node({0, 0, -14}, "root");
+  const int good = maker.node({0, 0, 0}, "good");
+  const int bad = maker.node({-9, 0, 12}, "bad");
+  maker.line(root, good, 1.5);
+  maker.line(good, maker.node({10, 0, 10}, "right"), 1.2);
+  maker.line(good, bad, 1.1);
+  spoil(maker, bad);
+  maker.tree.inlets = {root};
+  return seed_model(maker.tree);
+}
+
+// The model has all but the impossible, and names that in a failure, a warning or an assumption.
+void expect_the_rest(const Result<Model>& model, const std::vector<std::string>& named) {
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(region_names(model->network).contains("junction_good"));
+  EXPECT_TRUE(region_names(model->network).contains("wall_good_right"));
+  expect_smooth(model->network);
+  std::string said;
+  for (const FailedPart& part : model->failed) said += part.name + ": " + part.why + "\n";
+  for (const std::string& text : model->warnings) said += text + "\n";
+  for (const std::string& text : model->assumptions) said += text + "\n";
+  for (const std::string& word : named) {
+    EXPECT_NE(said.find(word), std::string::npos) << word << " is not in: " << said;
+  }
+}
+
+TEST(SeedModel, TwoBranchesInTheSameDirectionAreNamedAndTheRestIsThere) {
+  expect_the_rest(forked_tree([](TreeMaker& maker, int bad) {
+                    maker.line(bad, maker.node({-18, 0, 24}, "a"), 0.9);
+                    maker.line(bad, maker.node({-18.01, 0, 24}, "b"), 0.8);
+                  }),
+                  {"bad_b"});
+}
+
+TEST(SeedModel, ABranchThatRunsBackThroughItsJunctionIsNamedAndTheRestIsThere) {
+  expect_the_rest(forked_tree([](TreeMaker& maker, int bad) {
+                    maker.line(bad, maker.node({-16, 0, 24}, "a"), 0.9);
+                    maker.line(bad, maker.node({-3, 0, 4}, "b"), 0.8);
+                  }),
+                  {"bad_b"});
+}
+
 TEST(SeedModel, RandomTreesAreSmoothAndNameWhatFailed) {
   Random random(11);
   int junctions = 0;

@@ -1,0 +1,271 @@
+#include "modeling/frontal_factor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <Eigen/OrderingMethods>
+
+#include "base/contract.h"
+
+namespace angiospline {
+namespace {
+
+constexpr int kBlock = 32;       // pivots that are eliminated before the rest of a front is updated
+constexpr int kSmallFront = 24;  // rows below which plain loops are faster than blocks
+constexpr double kMoreZeros = 0.3;  // share of a merged front's columns that may be padding
+constexpr int kTinyFront = 8;       // pivots below which a front is merged more readily
+constexpr double kMostZerosOfTiny = 0.6;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Row patterns of the strict lower triangle of the permuted matrix, column by column.
+std::vector<std::vector<int>> permuted_columns(const Eigen::SparseMatrix<double>& lower,
+                                               const std::vector<int>& place) {
+  std::vector<std::vector<int>> columns(place.size());
+  for (int c = 0; c < lower.outerSize(); ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(lower, c); it; ++it) {
+      const int a = place[at(static_cast<int>(it.row()))];
+      const int b = place[at(c)];
+      if (a != b) columns[at(std::min(a, b))].push_back(std::max(a, b));
+    }
+  }
+  for (auto& rows : columns) std::sort(rows.begin(), rows.end());
+  return columns;
+}
+
+// Liu's algorithm with path compression on the rows of the lower triangle.
+std::vector<int> elimination_tree(const std::vector<std::vector<int>>& columns) {
+  const int n = static_cast<int>(columns.size());
+  std::vector<std::vector<int>> by_row(columns.size());
+  for (int c = 0; c < n; ++c) {
+    for (const int r : columns[at(c)]) by_row[at(r)].push_back(c);
+  }
+  std::vector<int> parent(columns.size(), -1);
+  std::vector<int> ancestor(columns.size(), -1);
+  for (int r = 0; r < n; ++r) {
+    for (int c : by_row[at(r)]) {
+      while (c != -1 && c < r) {
+        const int next = std::exchange(ancestor[at(c)], r);
+        if (next == -1) parent[at(c)] = r;
+        c = next;
+      }
+    }
+  }
+  return parent;
+}
+
+// The place of each node in an order in which children come right before their parents.
+std::vector<int> postorder(const std::vector<int>& parent) {
+  const int n = static_cast<int>(parent.size());
+  std::vector<std::vector<int>> children(parent.size());
+  std::vector<int> stack;
+  for (int k = n - 1; k >= 0; --k) {
+    if (parent[at(k)] < 0) {
+      stack.push_back(k);
+    } else {
+      children[at(parent[at(k)])].push_back(k);
+    }
+  }
+  std::vector<int> place(parent.size());
+  int next = n;
+  // Parents are met first: places are given from the end.
+  while (!stack.empty()) {
+    const int node = stack.back();
+    stack.pop_back();
+    place[at(node)] = --next;
+    for (const int child : children[at(node)]) stack.push_back(child);
+  }
+  return place;
+}
+
+// Eliminates the first `pivots` columns of a front's lower triangle.
+bool eliminate(Eigen::MatrixXd& F, int pivots, Eigen::VectorXd& diagonal) {
+  const int size = static_cast<int>(F.rows());
+  Eigen::MatrixXd scaled;
+  for (int first = 0; first < pivots; first += kBlock) {
+    const int count = std::min(kBlock, pivots - first);
+    const int end = first + count;
+    for (int k = first; k < end; ++k) {
+      const double pivot = F(k, k);
+      if (!std::isfinite(pivot) || pivot == 0) return false;
+      diagonal(k) = pivot;
+      const int below = size - k - 1;
+      F.col(k).tail(below) /= pivot;
+      // The other columns of the block only.
+      for (int j = k + 1; j < end; ++j) {
+        F.col(j).tail(size - j) -= (F(j, k) * pivot) * F.col(k).tail(size - j);
+      }
+    }
+    const int rest = size - end;
+    if (rest == 0) continue;
+    const auto L = F.block(end, first, rest, count);
+    scaled.noalias() = L * diagonal.segment(first, count).asDiagonal();
+    if (rest < kSmallFront) {
+      for (int j = 0; j < rest; ++j) {
+        F.col(end + j).tail(rest - j).noalias() -=
+            L.bottomRows(rest - j) * scaled.row(j).transpose();
+      }
+    } else {
+      F.bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() -= L * scaled.transpose();
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+FrontalFactor::FrontalFactor(const Eigen::SparseMatrix<double>& lower) {
+  EXPECTS(lower.rows() == lower.cols() && lower.isCompressed());
+  find_order(lower);
+  find_fronts(lower);
+  place_entries(lower);
+}
+
+void FrontalFactor::find_order(const Eigen::SparseMatrix<double>& lower) {
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
+  Eigen::AMDOrdering<int>()(lower.selfadjointView<Eigen::Lower>(), order);
+  // order.indices()(k) is the row that is eliminated k-th.
+  place_.resize(at(static_cast<int>(lower.rows())));
+  for (int k = 0; k < static_cast<int>(lower.rows()); ++k) place_[at(order.indices()(k))] = k;
+  const std::vector<int> after = postorder(elimination_tree(permuted_columns(lower, place_)));
+  for (int& p : place_) p = after[at(p)];
+}
+
+void FrontalFactor::find_fronts(const Eigen::SparseMatrix<double>& lower) {
+  std::vector<std::vector<int>> below = permuted_columns(lower, place_);
+  const int n = static_cast<int>(below.size());
+  // Patterns of L: a column hands its pattern to its parent, the first row below it.
+  for (int c = 0; c < n; ++c) {
+    auto& rows = below[at(c)];
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+    if (rows.empty()) continue;
+    auto& of_parent = below[at(rows.front())];
+    std::vector<int> both;
+    both.reserve(of_parent.size() + rows.size());
+    // The parent's own list may still hold repeats: they go when its turn comes.
+    std::merge(rows.begin() + 1, rows.end(), of_parent.begin(), of_parent.end(),
+               std::back_inserter(both));
+    both.erase(std::unique(both.begin(), both.end()), both.end());
+    of_parent = std::move(both);
+  }
+  // Fronts from the left; a front joins the one before it if that hands on to it and little is
+  // padded. zeros: entries of the front that are padding.
+  std::vector<double> zeros;
+  for (int c = 0; c < n; ++c) {
+    Front front;
+    front.pivots = 1;
+    front.rows = {c};
+    front.rows.insert(front.rows.end(), below[at(c)].begin(), below[at(c)].end());
+    double padding = 0;
+    while (!fronts_.empty()) {
+      const Front& before = fronts_.back();
+      const int last = before.rows[at(before.pivots - 1)];
+      const bool hands_on = before.size() > before.pivots &&
+                            before.rows[at(before.pivots)] == front.rows.front() &&
+                            last + 1 == front.rows.front();
+      if (!hands_on) break;
+      const int pivots = before.pivots + front.pivots;
+      const double added =
+          static_cast<double>(before.pivots) * (front.size() + before.pivots - before.size());
+      const double all = padding + zeros.back() + added;
+      const double area = static_cast<double>(pivots) * (before.pivots + front.size());
+      const double most = pivots <= kTinyFront ? kMostZerosOfTiny : kMoreZeros;
+      if (all > most * area && added > 0) break;
+      std::vector<int> rows(before.rows.begin(), before.rows.begin() + before.pivots);
+      rows.insert(rows.end(), front.rows.begin(), front.rows.end());
+      front.rows = std::move(rows);
+      front.pivots = pivots;
+      padding = all;
+      fronts_.pop_back();
+      zeros.pop_back();
+    }
+    fronts_.push_back(std::move(front));
+    zeros.push_back(padding);
+  }
+}
+
+void FrontalFactor::place_entries(const Eigen::SparseMatrix<double>& lower) {
+  std::vector<int> front_of(place_.size());
+  for (int f = 0; f < static_cast<int>(fronts_.size()); ++f) {
+    for (int k = 0; k < fronts_[at(f)].pivots; ++k) front_of[at(fronts_[at(f)].rows[at(k)])] = f;
+  }
+  const auto row_in = [](const Front& front, int row) {
+    const auto found = std::lower_bound(front.rows.begin(), front.rows.end(), row);
+    return static_cast<int>(found - front.rows.begin());
+  };
+  for (int c = 0; c < lower.outerSize(); ++c) {
+    for (int k = lower.outerIndexPtr()[c]; k < lower.outerIndexPtr()[c + 1]; ++k) {
+      const int a = place_[at(lower.innerIndexPtr()[k])];
+      const int b = place_[at(c)];
+      Front& front = fronts_[at(front_of[at(std::min(a, b))])];
+      const std::ptrdiff_t column = row_in(front, std::min(a, b));
+      front.entries.push_back({k, column * front.size() + row_in(front, std::max(a, b))});
+    }
+  }
+  for (int f = 0; f < static_cast<int>(fronts_.size()); ++f) {
+    Front& front = fronts_[at(f)];
+    front.matrix.resize(front.size(), front.size());
+    front.diagonal.resize(front.pivots);
+    if (front.size() == front.pivots) continue;
+    front.parent = front_of[at(front.rows[at(front.pivots)])];
+    fronts_[at(front.parent)].children.push_back(f);
+    for (int k = front.pivots; k < front.size(); ++k) {
+      front.rows_in_parent.push_back(row_in(fronts_[at(front.parent)], front.rows[at(k)]));
+    }
+  }
+}
+
+bool FrontalFactor::factor(const Eigen::SparseMatrix<double>& lower) {
+  const double* values = lower.valuePtr();
+  for (Front& front : fronts_) {
+    front.matrix.setZero();
+    for (const Entry& e : front.entries) front.matrix.data()[e.place] = values[e.value];
+    for (const int c : front.children) {
+      const Front& child = fronts_[at(c)];
+      const int count = child.size() - child.pivots;
+      for (int j = 0; j < count; ++j) {
+        const double* from = &child.matrix(child.pivots, child.pivots + j);
+        double* to = front.matrix.col(child.rows_in_parent[at(j)]).data();
+        for (int i = j; i < count; ++i) to[child.rows_in_parent[at(i)]] += from[i];
+      }
+    }
+    if (!eliminate(front.matrix, front.pivots, front.diagonal)) return false;
+  }
+  return true;
+}
+
+Eigen::VectorXd FrontalFactor::solve(const Eigen::VectorXd& right) const {
+  Eigen::VectorXd x(right.size());
+  for (Eigen::Index k = 0; k < right.size(); ++k) x(place_[static_cast<std::size_t>(k)]) = right(k);
+  Eigen::VectorXd part;
+  for (const Front& front : fronts_) {
+    auto own = x.segment(front.rows.front(), front.pivots);
+    front.matrix.topLeftCorner(front.pivots, front.pivots)
+        .triangularView<Eigen::UnitLower>()
+        .solveInPlace(own);
+    const int count = front.size() - front.pivots;
+    part.noalias() = front.matrix.bottomLeftCorner(count, front.pivots) * own;
+    for (int i = 0; i < count; ++i) x(front.rows[at(front.pivots + i)]) -= part(i);
+  }
+  for (auto front = fronts_.rbegin(); front != fronts_.rend(); ++front) {
+    auto own = x.segment(front->rows.front(), front->pivots);
+    own.array() /= front->diagonal.array();
+    const int count = front->size() - front->pivots;
+    part.resize(count);
+    for (int i = 0; i < count; ++i) part(i) = x(front->rows[at(front->pivots + i)]);
+    own.noalias() -= front->matrix.bottomLeftCorner(count, front->pivots).transpose() * part;
+    front->matrix.topLeftCorner(front->pivots, front->pivots)
+        .triangularView<Eigen::UnitLower>()
+        .transpose()
+        .solveInPlace(own);
+  }
+  Eigen::VectorXd result(right.size());
+  for (Eigen::Index k = 0; k < right.size(); ++k) {
+    result(k) = x(place_[static_cast<std::size_t>(k)]);
+  }
+  return result;
+}
+
+}  // namespace angiospline
