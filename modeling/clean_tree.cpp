@@ -1,6 +1,7 @@
 #include "modeling/clean_tree.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <set>
 #include <utility>
@@ -107,6 +108,7 @@ class Cleaner {
   explicit Cleaner(const CenterlineTree& tree) : tree_(tree), alive_(tree.branches.size(), true) {}
 
   CleanedTree clean() {
+    leave_out_branches_without_radius();
     for (CenterlineBranch& branch : tree_.branches) drop_repeated_points(branch);
     contract_branches_without_length();
     join_chains();
@@ -135,6 +137,22 @@ class Cleaner {
     return at;
   }
 
+  void leave_out_branches_without_radius() {
+    for (std::size_t b = 0; b < tree_.branches.size(); ++b) {
+      const CenterlineBranch& branch = tree_.branches[b];
+      const auto& r = branch.radii_mm;
+      const auto bad = std::find_if(
+          r.begin(), r.end(), [](double value) { return !(value > 0 && std::isfinite(value)); });
+      if (bad == r.end()) continue;
+      alive_[b] = false;
+      warnings_.push_back(fmt::format(
+          "branch {} ({} to {}), point {}: radius is not positive: {} (radii are positive and "
+          "finite): left out",
+          branch.name, tree_.nodes[index(branch.from)].name, tree_.nodes[index(branch.to)].name,
+          bad - r.begin(), *bad));
+    }
+  }
+
   void contract_branches_without_length() {
     std::vector<int> node(tree_.nodes.size());
     std::iota(node.begin(), node.end(), 0);
@@ -143,6 +161,7 @@ class Cleaner {
       return n;
     };
     for (std::size_t b = 0; b < tree_.branches.size(); ++b) {
+      if (!alive_[b]) continue;
       const CenterlineBranch& branch = tree_.branches[b];
       // After dropping repeats, two points closer than the tolerance are left of a branch without
       // length.

@@ -13,7 +13,8 @@ struct CleanedTree {
   std::vector<std::string> warnings;  // what was dropped, by name
 };
 
-// In this order: points that repeat the one before them; branches without length (their nodes
+// In this order: branches with a radius that is not positive and finite; points that repeat the one
+// before them; branches without length (their nodes
 // become one); spurs, that is terminal branches whose tip lies inside the lumen of another branch
 // of their node (shortest first, and never below two branches at a node); nodes of degree two,
 // whose branches are joined under the name "<from>_<to>"; points that were traced out of order (the

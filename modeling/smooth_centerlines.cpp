@@ -100,6 +100,14 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
   SmoothedTree result{std::move(cleaned.tree), {}, 0.0, std::move(cleaned.warnings)};
   std::vector<CenterlineBranch>& branches = result.tree.branches;
   if (branches.empty()) {
+    const auto without_radius =
+        std::find_if(tree.branches.begin(), tree.branches.end(), [](const CenterlineBranch& b) {
+          return !(b.radii_mm.allFinite() && b.radii_mm.minCoeff() > 0);
+        });
+    if (without_radius != tree.branches.end()) {
+      return fail({ErrorKind::kBadInput, "no branch is left", tree.source, result.warnings.front(),
+                   "branches have positive radii and a length"});
+    }
     return fail({ErrorKind::kBadInput,
                  "no branch has a positive length",
                  tree.source,

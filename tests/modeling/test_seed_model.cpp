@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <set>
 
@@ -292,6 +293,50 @@ TEST(SeedModel, ABranchThatRunsBackThroughItsJunctionIsNamedAndTheRestIsThere) {
   expect_the_rest(forked_tree([](TreeMaker& maker, int bad) {
                     maker.line(bad, maker.node({-16, 0, 24}, "a"), 0.9);
                     maker.line(bad, maker.node({-3, 0, 4}, "b"), 0.8);
+                  }),
+                  {"bad_b"});
+}
+
+TEST(SeedModel, ABranchWithoutRadiusIsNamedAndTheRestIsThere) {
+  for (const double radius : {0.0, -0.5, std::numeric_limits<double>::quiet_NaN()}) {
+    const Result<Model> model = forked_tree([radius](TreeMaker& maker, int bad) {
+      maker.line(bad, maker.node({-16, 0, 24}, "a"), 0.9);
+      maker.line(bad, maker.node({-16, 8, 16}, "b"), 0.8);
+      maker.tree.branches.back().radii_mm(7) = radius;
+    });
+    expect_the_rest(model, {"branch bad_b (bad to b), point 7", "radius is not positive"});
+    // The other branches of its node are there, as one vessel.
+    EXPECT_EQ(rim_names(model->network),
+              (std::set<std::string>{"inlet", "outlet_right", "outlet_a"}));
+    EXPECT_FALSE(region_names(model->network).contains("junction_bad"));
+  }
+}
+
+TEST(SeedModel, OnlyBranchesWithoutRadiusAreAnError) {
+  TreeMaker maker;
+  maker.line(maker.node({0, 0, 0}, "a"), maker.node({0, 0, 9}, "b"), 0.0);
+  const Result<Model> model = seed_model(maker.tree);
+  ASSERT_FALSE(model);
+  EXPECT_EQ(model.error().kind, ErrorKind::kBadInput);
+  EXPECT_NE(model.error().message().find("branch a_b (a to b), point 0: radius is not positive: 0"),
+            std::string::npos)
+      << model.error().message();
+}
+
+// Leaves to one side, goes round a circle, comes back through the fork's middle and goes on.
+TEST(SeedModel, ACurvedBranchThatLoopsBackThroughItsJunctionIsNamedAndTheRestIsThere) {
+  expect_the_rest(forked_tree([](TreeMaker& maker, int bad) {
+                    maker.line(bad, maker.node({-16, 0, 24}, "a"), 0.9);
+                    const Vec3 start = maker.tree.nodes[static_cast<std::size_t>(bad)].position_mm;
+                    const Vec3 side(0, 1, 0);
+                    const Vec3 away = Vec3(0.8, 0, 0.6);
+                    const auto shape = [&](double t) {
+                      constexpr double kLoop = 0.75;  // of the way; then straight on
+                      if (t > kLoop) return Vec3(start + 9 * (t - kLoop) / (1 - kLoop) * side);
+                      const double a = 2 * kPi * t / kLoop;
+                      return Vec3(start + 5 * (std::sin(a) * side + (1 - std::cos(a)) * away));
+                    };
+                    maker.branch(bad, maker.node(shape(1.0), "b"), 0.8, shape, 60);
                   }),
                   {"bad_b"});
 }
