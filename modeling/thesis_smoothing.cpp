@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "base/contract.h"
@@ -13,6 +14,7 @@
 #include "kernel/split.h"
 #include "modeling/assembly.h"
 #include "modeling/body.h"
+#include "modeling/corner_tangents.h"
 #include "modeling/junction.h"
 #include "modeling/smooth_network.h"
 
@@ -263,8 +265,35 @@ void move_like_a_fit(ThesisTessellation& model) {
   }
 }
 
+struct Case {
+  ThesisCase which;
+  const char* name;
+  const char* thesis;
+  const SurfaceNetwork& network;
+  std::vector<std::vector<int>> systems;
+  bool floating;
+};
+
+Result<ThesisSmoothingRow> run_case(const Case& one, double most_seconds,
+                                    const Progress& progress) {
+  ThesisSmoothingRow row{one.which, one.name, one.thesis, "SLSQP on triple curves", 0, 0, {}, 0, 0};
+  SurfaceNetwork network = one.network;
+  TripleSmoothingOptions options;
+  options.floating = one.floating;
+  options.most_seconds = most_seconds;
+  row.patches = static_cast<int>(network.patches.size());
+  row.systems = static_cast<int>(one.systems.size());
+  row.before_deg = worst_of_all(network);
+  auto reports = smooth_by_triple_curves(network, one.systems, options, progress);
+  if (!reports) return fail(reports.error());
+  row.reports = std::move(*reports);
+  row.after_deg = worst_of_all(network);
+  return row;
+}
+
 ThesisSmoothingRow sparse_row(const ThesisBifurcation& model) {
-  ThesisSmoothingRow row{"all 21 boundaries", "", "sparse cofactor form", 12, 1, {}, 0, 0};
+  ThesisSmoothingRow row{
+      ThesisCase::kSparse, "all 21 boundaries", "", "sparse cofactor form", 12, 1, {}, 0, 0};
   const auto begin = std::chrono::steady_clock::now();
   const auto smoothed = smooth_network(model.network);
   TripleSystemReport report;
@@ -305,61 +334,67 @@ ThesisTessellation tessellated(const ThesisBifurcation& bifurcation) {
   return Quartering(bifurcation).run();
 }
 
+double flatten_corners(ThesisTessellation& tessellation) {
+  std::set<int> corners;
+  for (const std::vector<int>& joins : tessellation.systems) {
+    for (const int j : joins) {
+      const Join& join = tessellation.network.joins[at(j)];
+      const std::vector<int>& control = tessellation.network.patches[at(join.a.patch)].control;
+      corners.insert({control[5], control.back()});  // the ends of side V1
+    }
+  }
+  double farthest = 0;
+  for (const int c : corners)
+    farthest = std::max(farthest, flatten_corner(tessellation.network, c));
+  return farthest;
+}
+
 Result<std::vector<ThesisSmoothingRow>> run_thesis_smoothing(double most_seconds,
                                                              const Progress& progress) {
   const Result<ThesisBifurcation> model = thesis_bifurcation();
   if (!model) return fail(model.error());
-  std::vector<ThesisSmoothingRow> rows;
-  const auto run = [&](ThesisSmoothingRow row, SurfaceNetwork network,
-                       const std::vector<std::vector<int>>& systems,
-                       bool floating) -> Result<void> {
-    progress.at(row.name, static_cast<double>(rows.size()) / 6);
-    TripleSmoothingOptions options;
-    options.floating = floating;
-    options.most_seconds = most_seconds;
-    row.patches = static_cast<int>(network.patches.size());
-    row.systems = static_cast<int>(systems.size());
-    row.before_deg = worst_of_all(network);
-    auto reports = smooth_by_triple_curves(network, systems, options, progress);
-    if (!reports) return fail(reports.error());
-    row.reports = std::move(*reports);
-    row.after_deg = worst_of_all(network);
-    rows.push_back(std::move(row));
-    return {};
-  };
-  const auto named = [](const char* name, const char* thesis) {
-    return ThesisSmoothingRow{name, thesis, "SLSQP on triple curves", 0, 0, {}, 0, 0};
-  };
   std::vector<int> all(model->network.joins.size());
   std::iota(all.begin(), all.end(), 0);
   const ThesisTessellation cut = tessellated(*model);
+  ThesisTessellation level = cut;
+  flatten_corners(level);
   ThesisTessellation fitted = cut;
   move_like_a_fit(fitted);
-  Result<void> ran = run(named("all 21 boundaries", "436 constraints, 726 unknowns: impractical"),
-                         model->network, {all}, true);
-  if (ran) {
-    ran = run(named("the 6 rough boundaries",
-                    "134 constraints, 156 unknowns, 10,000 iterations, over 4 days"),
-              model->network, {model->rough}, true);
+  ThesisTessellation fitted_level = fitted;
+  flatten_corners(fitted_level);
+  const std::vector<Case> cases{
+      {ThesisCase::kAll,
+       "all 21 boundaries",
+       "436 constraints, 726 unknowns: impractical",
+       model->network,
+       {all},
+       true},
+      {ThesisCase::kRough,
+       "the 6 rough boundaries",
+       "134 constraints, 156 unknowns, 10,000 iterations, over 4 days",
+       model->network,
+       {model->rough},
+       true},
+      {ThesisCase::kHeld, "tessellated, boundaries held",
+       "28 patches, 2 systems of 45 constraints, 66 unknowns, 10,000 iterations, 45 min",
+       cut.network, cut.systems, false},
+      {ThesisCase::kHeldLevel, "tessellated, corners level, boundaries held", "", level.network,
+       cut.systems, false},
+      {ThesisCase::kFloating, "tessellated, boundaries floating", "", cut.network, cut.systems,
+       true},
+      {ThesisCase::kFittedHeld, "after a fit, boundaries held",
+       "45 constraints, 66 unknowns: unacceptable", fitted.network, cut.systems, false},
+      {ThesisCase::kFittedHeldLevel, "after a fit, corners level, boundaries held", "",
+       fitted_level.network, cut.systems, false},
+      {ThesisCase::kFittedFloating, "after a fit, boundaries floating",
+       "45 constraints, 102 unknowns: continuous", fitted.network, cut.systems, true}};
+  std::vector<ThesisSmoothingRow> rows;
+  for (const Case& one : cases) {
+    progress.at(one.name, static_cast<double>(rows.size()) / static_cast<double>(cases.size()));
+    auto row = run_case(one, most_seconds, progress);
+    if (!row) return fail(row.error());
+    rows.push_back(std::move(*row));
   }
-  if (ran) {
-    ran = run(
-        named("tessellated, boundaries held",
-              "28 patches, 2 systems of 45 constraints, 66 unknowns, 10,000 iterations, 45 min"),
-        cut.network, cut.systems, false);
-  }
-  if (ran) {
-    ran = run(named("tessellated, boundaries floating", ""), cut.network, cut.systems, true);
-  }
-  if (ran) {
-    ran = run(named("after a fit, boundaries held", "45 constraints, 66 unknowns: unacceptable"),
-              fitted.network, fitted.systems, false);
-  }
-  if (ran) {
-    ran = run(named("after a fit, boundaries floating", "45 constraints, 102 unknowns: continuous"),
-              fitted.network, fitted.systems, true);
-  }
-  if (!ran) return fail(ran.error());
   rows.push_back(sparse_row(*model));
   return rows;
 }

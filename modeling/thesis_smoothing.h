@@ -28,9 +28,26 @@ struct ThesisTessellation {
 };
 ThesisTessellation tessellated(const ThesisBifurcation& bifurcation);
 
+// Levels every corner at which a boundary of the systems ends (corner_tangents.h): without it the
+// held curves' own tangents forbid a common tangent plane there. The farthest move of a point, mm.
+double flatten_corners(ThesisTessellation& tessellation);
+
+enum class ThesisCase {
+  kAll,
+  kRough,
+  kHeld,
+  kHeldLevel,  // not the thesis's: kHeld after flatten_corners
+  kFloating,
+  kFittedHeld,
+  kFittedHeldLevel,
+  kFittedFloating,
+  kSparse,
+};
+
 // A row of the comparison. Figures of the thesis are text, as it prints them; ours are the sums and
 // largest values over the case's systems.
 struct ThesisSmoothingRow {
+  ThesisCase which = ThesisCase::kAll;
   std::string name;
   std::string thesis;  // "134 constraints, 156 unknowns, 10,000 iterations, 4 days"
   std::string method;  // "SLSQP on triple curves", "sparse cofactor form"
@@ -41,10 +58,10 @@ struct ThesisSmoothingRow {
   double after_deg = 0.0;
 };
 
-// Every case, in the thesis's order: all 21 boundaries; the 6 rough ones; the tessellation with
-// boundaries held and floating; the same moved at random as a fit would, held and floating; and,
-// for comparison, all boundaries by the sparse form. `most_seconds` bounds each system. Errors:
-// stopped on request.
+// Every case of ThesisCase, in that order: all 21 boundaries; the 6 rough ones; the tessellation
+// with boundaries held, held after its corners were levelled, and floating; the same three moved at
+// random as a fit would; and, for comparison, all boundaries by the sparse form. `most_seconds`
+// bounds each system. Errors: stopped on request.
 Result<std::vector<ThesisSmoothingRow>> run_thesis_smoothing(double most_seconds = 20.0,
                                                              const Progress& progress = {});
 

@@ -13,6 +13,7 @@
 #include <nlopt.hpp>
 #include <tbb/parallel_for.h>
 
+#include "base/random.h"
 #include "kernel/reshape.h"
 #include "kernel/triple_curve.h"
 
@@ -23,6 +24,9 @@ constexpr double kDependent = 1e-7;  // singular values below this share of the 
 constexpr int kMostRestarts = 6;
 constexpr double kWorthwhile = 0.7;  // of the angle before: what improves it less is taken back
 constexpr int kAngleSamples = 32;
+constexpr int kPlaces = 4;             // at which gradients are taken to find what is fixed
+constexpr double kApart = 0.1;         // those places, in units of the system's size
+constexpr double kUnchanging = 1e-10;  // gradients below this share of the largest are zero
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -52,6 +56,18 @@ std::vector<int> side_columns(const Patch& patch, PatchSide side, int depth) {
     columns.push_back(patch.control[at(i * across + j)]);
   }
   return columns;
+}
+
+// Between the normals at share `s` of a join.
+double join_angle_deg_at(const SurfaceNetwork& network, int j, double s) {
+  const Join& join = network.joins[at(j)];
+  const auto normal = [&](const Side& side, double along) {
+    const Vec2 uv = side_parameters(network.patches[at(side.patch)], side.side, along);
+    return normal_vector(patch_surface(network, side.patch), uv.x(), uv.y());
+  };
+  const Vec3 na = normal(join.a, join_parameter_a(join, s));
+  const Vec3 nb = normal(join.b, join_parameter_b(join, s));
+  return std::atan2(na.cross(nb).norm(), na.dot(nb)) * 180 / std::numbers::pi;
 }
 
 // One boundary: its triple curve, divided by the lengths of its factors at the start.
@@ -124,6 +140,7 @@ class TripleSystem {
       report.after_deg = now;
       if (now <= options_.wanted_deg) report.ending = TripleEnding::kSmooth;
     }
+    if (!options_.floating || report.ending != TripleEnding::kSmooth) find_fixed(report);
     report.evaluations = evaluations_;
     report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -225,6 +242,50 @@ class TripleSystem {
     chosen_ = svd.matrixU().leftCols(rank) * s.head(rank).cwiseInverse().asDiagonal();
   }
 
+  // Combinations whose gradient vanishes at several places in general position: these are
+  // polynomials in the unknowns, so it vanishes everywhere and their values are constants.
+  void find_fixed(TripleSystemReport& report) {
+    Eigen::VectorXd values;
+    Eigen::MatrixXd J;
+    evaluate(values, &J);
+    Eigen::MatrixXd all(J.rows(), kPlaces * J.cols());
+    const Points3 here = network_.control_points_mm;
+    Random random(static_cast<std::uint64_t>(constraints_));
+    for (int k = 0; k < kPlaces; ++k) {
+      for (const int c : columns_) {
+        for (int d = 0; d < 3; ++d) {
+          network_.control_points_mm(d, c) = here(d, c) + kApart * size_ * random.gaussian();
+        }
+      }
+      Eigen::VectorXd there;
+      evaluate(there, &J);
+      all.middleCols(k * J.cols(), J.cols()) = J;
+    }
+    network_.control_points_mm = here;
+    const Eigen::BDCSVD<Eigen::MatrixXd> svd(all, Eigen::ComputeFullU);
+    const Eigen::VectorXd& s = svd.singularValues();
+    const auto changing = (s.array() > kUnchanging * s(0)).count();
+    report.fixed = static_cast<int>(all.rows() - changing);
+    report.fixed_residual = (svd.matrixU().rightCols(report.fixed).transpose() * values).norm();
+    report.fixed_angle_deg = fixed_end_angle(all);
+  }
+
+  double fixed_end_angle(const Eigen::MatrixXd& gradients) const {
+    const double largest = gradients.rowwise().norm().maxCoeff();
+    double worst = 0;
+    Eigen::Index row = 0;
+    for (const Boundary& boundary : boundaries_) {
+      const auto nodes = static_cast<Eigen::Index>(boundary.curve.nodes().size());
+      for (const bool last : {false, true}) {
+        const Eigen::Index end = last ? row + nodes - 1 : row;
+        if (gradients.row(end).norm() > kUnchanging * largest) continue;
+        worst = std::max(worst, join_angle_deg_at(network_, boundary.join, last ? 1.0 : 0.0));
+      }
+      row += nodes;
+    }
+    return worst;
+  }
+
   void place(const double* x) {
     for (std::size_t k = 0; k < columns_.size(); ++k) {
       network_.control_points_mm.col(columns_[k]) =
@@ -307,21 +368,11 @@ std::optional<Error> find_bad_join(const SurfaceNetwork& network, int j) {
 }  // namespace
 
 double join_angle_deg(const SurfaceNetwork& network, int j) {
-  const Join& join = network.joins[at(j)];
-  const BSplineSurface<3> a = patch_surface(network, join.a.patch);
-  const BSplineSurface<3> b = patch_surface(network, join.b.patch);
   double worst = 0;
   for (int k = 0; k <= kAngleSamples; ++k) {
-    const double s = static_cast<double>(k) / kAngleSamples;
-    const Vec2 ua =
-        side_parameters(network.patches[at(join.a.patch)], join.a.side, join_parameter_a(join, s));
-    const Vec2 ub =
-        side_parameters(network.patches[at(join.b.patch)], join.b.side, join_parameter_b(join, s));
-    const Vec3 na = normal_vector(a, ua.x(), ua.y());
-    const Vec3 nb = normal_vector(b, ub.x(), ub.y());
-    worst = std::max(worst, std::atan2(na.cross(nb).norm(), na.dot(nb)));
+    worst = std::max(worst, join_angle_deg_at(network, j, static_cast<double>(k) / kAngleSamples));
   }
-  return worst * 180 / std::numbers::pi;
+  return worst;
 }
 
 Result<std::vector<TripleSystemReport>> smooth_by_triple_curves(

@@ -33,6 +33,13 @@ struct TripleSystemReport {
   int independent = 0;  // rank of their gradients at the start: what the solver is given
   int unknowns = 0;     // coordinates of control points that may move
   int distances = 0;    // those control points: the terms of "move as little as possible"
+  // What no unknown can change, wherever it moves (measured where boundaries are held, or where no
+  // solution was found): combinations of the constraints, and how far from zero they are. Phi is
+  // divided by mean lengths of its factors, so this is about a sine. Above zero: no solution
+  // exists.
+  int fixed = 0;
+  double fixed_residual = 0.0;   // norm of their values: a lower bound for the norm of all of Phi
+  double fixed_angle_deg = 0.0;  // largest angle at a boundary's end that no unknown can change
   int evaluations = 0;
   double seconds = 0.0;
   double before_deg = 0.0;  // largest angle between normals over the system's boundaries

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
+#include <map>
 #include <optional>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -10,18 +12,42 @@
 namespace angiospline::experiments {
 namespace {
 
-// Constraints, unknowns, iterations and seconds that the thesis states for its cases, in the order
-// of run_thesis_smoothing; what it only describes is left open.
-using Stated = std::array<std::optional<double>, 4>;
 constexpr double kDay = 86400;
-constexpr std::array<Stated, 4> kStated{
-    {{436, 726, {}, {}}, {134, 156, 10000, 4 * kDay}, {45, 66, 10000, 45 * 60}, {}}};
-constexpr Stated kHeld{45, 66, {}, {}};
-constexpr Stated kFloating{45, 102, {}, {}};
 
-Stated stated(std::size_t row) {
-  if (row < kStated.size()) return kStated[row];
-  return row == 4 ? kHeld : row == 5 ? kFloating : Stated{};
+// Constraints, unknowns, iterations and seconds that the thesis states; what it only describes is
+// left open.
+using Stated = std::array<std::optional<double>, 4>;
+Stated stated(ThesisCase which) {
+  switch (which) {
+    case ThesisCase::kAll:
+      return {436, 726, {}, {}};
+    case ThesisCase::kRough:
+      return {134, 156, 10000, 4 * kDay};
+    case ThesisCase::kHeld:
+      return {45, 66, 10000, 45 * 60};
+    case ThesisCase::kFittedHeld:
+      return {45, 66, {}, {}};
+    case ThesisCase::kFittedFloating:
+      return {45, 102, {}, {}};
+    case ThesisCase::kHeldLevel:
+    case ThesisCase::kFloating:
+    case ThesisCase::kFittedHeldLevel:
+    case ThesisCase::kSparse:
+      break;
+  }
+  return {};
+}
+
+// Why there is no solution, in figures.
+std::string certificate(const ThesisSmoothingRow& row) {
+  std::string text;
+  for (const TripleSystemReport& r : row.reports) {
+    if (r.ending == TripleEnding::kSmooth) continue;
+    text += fmt::format(
+        "; {} of {} constraints no unknown can change: residual {:.2g}, {:.3g} degrees at ends",
+        r.fixed, r.constraints, r.fixed_residual, r.fixed_angle_deg);
+  }
+  return text;
 }
 
 double largest(const ThesisSmoothingRow& row, double TripleSystemReport::*figure) {
@@ -37,11 +63,10 @@ Result<ReproducedTable> smoothing(const ReproduceOptions& options, const Progres
   if (!rows) return fail(rows.error());
   ReproducedTable t;
   t.columns = {"constraints", "unknowns", "iterations", "seconds"};
-  double rough = 0, held = 0, floating = 0;
-  for (std::size_t k = 0; k < rows->size(); ++k) {
-    const ThesisSmoothingRow& row = (*rows)[k];
+  std::map<ThesisCase, double> left_deg;
+  for (const ThesisSmoothingRow& row : *rows) {
     const TripleSystemReport& one = row.reports.front();
-    const Stated thesis = stated(k);
+    const Stated thesis = stated(row.which);
     const double after = largest(row, &TripleSystemReport::after_deg);
     const bool counted = one.constraints > 0;
     const auto ours = [&](int value) {
@@ -52,16 +77,20 @@ Result<ReproducedTable> smoothing(const ReproduceOptions& options, const Progres
                        {thesis[1], ours(one.unknowns)},
                        {thesis[2], ours(one.evaluations)},
                        {thesis[3], largest(row, &TripleSystemReport::seconds)}}});
-    t.notes.push_back(fmt::format("{}, {}: {} patches, {} system{}, {:.3g} -> {:.2g} degrees",
-                                  row.name, row.method, row.patches, row.systems,
-                                  row.systems == 1 ? "" : "s",
-                                  largest(row, &TripleSystemReport::before_deg), after));
-    if (k == 1) rough = after;
-    if (k == 4) held = after;
-    if (k == 5) floating = after;
+    t.notes.push_back(
+        fmt::format("{}, {}: {} patches, {} system{}, {:.3g} -> {:.2g} degrees{}", row.name,
+                    row.method, row.patches, row.systems, row.systems == 1 ? "" : "s",
+                    largest(row, &TripleSystemReport::before_deg), after, certificate(row)));
+    left_deg[row.which] = after;
   }
+  const double rough = left_deg[ThesisCase::kRough];
+  const double level = left_deg[ThesisCase::kHeldLevel];
+  const double held = left_deg[ThesisCase::kFittedHeld];
+  const double floating = left_deg[ThesisCase::kFittedFloating];
   t.trends.push_back({"the six rough boundaries become smooth", rough <= 0.01,
                       fmt::format("{:.2g} degrees", rough)});
+  t.trends.push_back({"the tessellation becomes smooth with boundaries held", level <= 0.01,
+                      fmt::format("{:.2g} degrees, once its corners are level", level)});
   t.trends.push_back({"after a fit, held boundaries do not become smooth and floating ones do",
                       held > 0.01 && floating <= 0.01,
                       fmt::format("{:.3g} and {:.2g} degrees", held, floating)});

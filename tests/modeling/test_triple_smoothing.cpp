@@ -67,7 +67,7 @@ TEST_F(TripleSmoothing, SolvesTheTessellationsTwoSystemsSideBySideWhenBoundaries
   }
 }
 
-TEST_F(TripleSmoothing, LeavesASystemThatHasNoSolutionAsItWas) {
+TEST_F(TripleSmoothing, LeavesASystemThatHasNoSolutionAsItWasAndSaysWhy) {
   ThesisTessellation cut = tessellated(model_);
   const Points3 before = cut.network.control_points_mm;
   TripleSmoothingOptions options;
@@ -75,8 +75,49 @@ TEST_F(TripleSmoothing, LeavesASystemThatHasNoSolutionAsItWas) {
   options.most_evaluations = 40;
   const auto reports = smooth_by_triple_curves(cut.network, cut.systems, options);
   ASSERT_TRUE(reports);
-  for (const TripleSystemReport& report : *reports) EXPECT_NE(report.ending, TripleEnding::kSmooth);
+  for (const TripleSystemReport& report : *reports) {
+    EXPECT_NE(report.ending, TripleEnding::kSmooth);
+    EXPECT_EQ(report.fixed, 6);  // both ends of three held curves
+    EXPECT_GT(report.fixed_residual, 0.01);
+    EXPECT_GT(report.fixed_angle_deg, 0.5);
+    EXPECT_LE(report.fixed_angle_deg, report.before_deg);
+  }
   EXPECT_EQ(cut.network.control_points_mm, before);
+}
+
+TEST_F(TripleSmoothing, SolvesTheTessellationWithBoundariesHeldOnceItsCornersAreLevel) {
+  ThesisTessellation cut = tessellated(model_);
+  const double levelled = flatten_corners(cut);
+  EXPECT_GT(levelled, 1e-4);
+  EXPECT_LT(levelled, 0.05);
+  EXPECT_LT(flatten_corners(cut), 1e-3 * levelled);
+  ASSERT_FALSE(find_defect(cut.network));
+  const SurfaceNetwork level = cut.network;
+  TripleSmoothingOptions options;
+  options.floating = false;
+  const auto reports = smooth_by_triple_curves(cut.network, cut.systems, options);
+  ASSERT_TRUE(reports) << reports.error().message();
+  for (const TripleSystemReport& report : *reports) {
+    EXPECT_EQ(report.constraints, 45);
+    EXPECT_EQ(report.fixed, 6);
+    EXPECT_LT(report.fixed_residual, 1e-12);
+    EXPECT_LT(report.fixed_angle_deg, 1e-6);
+    EXPECT_GT(report.before_deg, 0.5);
+    EXPECT_EQ(report.ending, TripleEnding::kSmooth);
+    EXPECT_LE(report.after_deg, 0.01);
+  }
+  // The boundaries are where they were.
+  for (const std::vector<int>& joins : cut.systems) {
+    for (const int j : joins) {
+      const std::vector<int>& control =
+          level.patches[static_cast<std::size_t>(level.joins[static_cast<std::size_t>(j)].a.patch)]
+              .control;
+      for (std::size_t i = 5; i < control.size(); i += 6) {
+        EXPECT_EQ(cut.network.control_points_mm.col(control[i]),
+                  level.control_points_mm.col(control[i]));
+      }
+    }
+  }
 }
 
 TEST_F(TripleSmoothing, RefusesBoundariesThatAreNotThereAndSystemsThatShareAPoint) {
