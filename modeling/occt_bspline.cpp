@@ -48,6 +48,44 @@ Axis axis(const KnotVector& knots, bool closed) {
   return result;
 }
 
+// OpenCASCADE looks for the knots before the start within one period and reads beyond its arrays
+// where that has fewer than degree + 1 poles: the knots to add, at even cuts of every span. None
+// for most.
+std::vector<double> missing_knots(const KnotVector& knots) {
+  std::vector<double> missing;
+  const Axis along = axis(knots, true);
+  const int lacking = knots.degree() + 1 - along.poles;
+  if (lacking <= 0) return missing;
+  const int spans = along.values.Length() - 1;
+  const int cuts = (lacking + spans - 1) / spans;
+  for (int i = 1; i <= spans; ++i) {
+    const double from = along.values.Value(i);
+    const double step = (along.values.Value(i + 1) - from) / (cuts + 1);
+    for (int k = 1; k <= cuts; ++k) missing.push_back(from + k * step);
+  }
+  return missing;
+}
+
+template <int D>
+BSplineCurve<D> with_enough_knots(const BSplineCurve<D>& curve) {
+  if (!is_periodic(curve)) return curve;
+  const std::vector<double> missing = missing_knots(curve.knots());
+  return missing.empty() ? curve : *insert_knots_periodic(curve, missing);
+}
+
+template <int D>
+BSplineSurface<D> with_enough_knots(BSplineSurface<D> surface) {
+  if (is_periodic_u(surface)) {
+    const std::vector<double> missing = missing_knots(surface.u());
+    if (!missing.empty()) surface = *insert_knots_periodic_u(surface, missing);
+  }
+  if (is_periodic_v(surface)) {
+    const std::vector<double> missing = missing_knots(surface.v());
+    if (!missing.empty()) surface = *insert_knots_periodic_v(surface, missing);
+  }
+  return surface;
+}
+
 // And back; nothing where OpenCASCADE's knots break an invariant of ours.
 std::optional<KnotVector> knot_vector(int degree, const TColStd_Array1OfReal& values,
                                       const TColStd_Array1OfInteger& multiplicities,
@@ -108,7 +146,8 @@ Eigen::Vector4d homogeneous_point(const gp_Pnt& p, double weight) {
 
 }  // namespace
 
-Handle(Geom_BSplineCurve) to_occt(const BSplineCurve<3>& curve) {
+Handle(Geom_BSplineCurve) to_occt(const BSplineCurve<3>& given) {
+  const BSplineCurve<3> curve = with_enough_knots(given);
   const Axis along = axis(curve.knots(), is_periodic(curve));
   TColgp_Array1OfPnt poles(1, along.poles);
   for (int i = 0; i < along.poles; ++i) poles.SetValue(i + 1, point(curve.control_points().col(i)));
@@ -116,7 +155,8 @@ Handle(Geom_BSplineCurve) to_occt(const BSplineCurve<3>& curve) {
                                along.periodic);
 }
 
-Handle(Geom_BSplineSurface) to_occt(const BSplineSurface<3>& surface) {
+Handle(Geom_BSplineSurface) to_occt(const BSplineSurface<3>& given) {
+  const BSplineSurface<3> surface = with_enough_knots(given);
   const Axis u = axis(surface.u(), is_periodic_u(surface));
   const Axis v = axis(surface.v(), is_periodic_v(surface));
   TColgp_Array2OfPnt poles(1, u.poles, 1, v.poles);
@@ -130,7 +170,8 @@ Handle(Geom_BSplineSurface) to_occt(const BSplineSurface<3>& surface) {
                                  v.periodic);
 }
 
-Handle(Geom_BSplineCurve) rational_to_occt(const BSplineCurve<4>& curve) {
+Handle(Geom_BSplineCurve) rational_to_occt(const BSplineCurve<4>& given) {
+  const BSplineCurve<4> curve = with_enough_knots(given);
   const Axis along = axis(curve.knots(), is_periodic(curve));
   TColgp_Array1OfPnt poles(1, along.poles);
   TColStd_Array1OfReal weights(1, along.poles);
@@ -144,7 +185,8 @@ Handle(Geom_BSplineCurve) rational_to_occt(const BSplineCurve<4>& curve) {
                                curve.knots().degree(), along.periodic);
 }
 
-Handle(Geom_BSplineSurface) rational_to_occt(const BSplineSurface<4>& surface) {
+Handle(Geom_BSplineSurface) rational_to_occt(const BSplineSurface<4>& given) {
+  const BSplineSurface<4> surface = with_enough_knots(given);
   const Axis u = axis(surface.u(), is_periodic_u(surface));
   const Axis v = axis(surface.v(), is_periodic_v(surface));
   TColgp_Array2OfPnt poles(1, u.poles, 1, v.poles);

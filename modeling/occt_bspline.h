@@ -13,8 +13,9 @@
 namespace angiospline {
 
 // The same curve or surface, ends clamped or floating as they are; closed ones and closed
-// directions (kernel/periodic.h) are periodic. Requires positive degrees up to 25 (OpenCASCADE's
-// largest) and multiplicities up to the degree inside and at a seam.
+// directions (kernel/periodic.h) are periodic. A period with fewer than degree + 1 poles is
+// cut finer first, since OpenCASCADE reads one period only. Requires positive degrees up to 25
+// (OpenCASCADE's largest) and multiplicities up to the degree inside and at a seam.
 Handle(Geom_BSplineCurve) to_occt(const BSplineCurve<3>& curve);
 Handle(Geom_BSplineSurface) to_occt(const BSplineSurface<3>& surface);
 
