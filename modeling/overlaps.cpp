@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <unordered_map>
@@ -15,7 +16,7 @@ namespace {
 
 constexpr double kCapsuleRadii = 0.5;  // length of a capsule
 constexpr int kMostCapsules = 4096;    // of one branch: a hair is cut more coarsely
-constexpr double kReturnRadii = 6.0;   // of way between two places of a branch that may overlap
+constexpr double kReturnRadii = 6.0;   // of way between two places that may overlap
 constexpr double kShortBranch = 2.0;   // in radii of its junctions: these then are one
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -194,6 +195,56 @@ std::vector<bool> beyond_junction(const std::vector<Contact>& contacts, int Cont
   return beyond;
 }
 
+// Of contacts of which some belong to a common junction along both branches: those that hang
+// together with such a one from capsule to capsule, on both branches at once. A branch that leaves
+// the junction, turns and comes back through what of the other belongs to it does not.
+std::vector<bool> hang_together(const std::vector<Contact>& contacts,
+                                const std::vector<bool>& beyond_a,
+                                const std::vector<bool>& beyond_b) {
+  std::map<std::pair<int, int>, std::size_t> places;
+  std::vector<bool> reached(contacts.size(), false);
+  std::vector<std::size_t> front;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    places.emplace(std::pair(contacts[k].number_a, contacts[k].number_b), k);
+    if (beyond_a[k] || beyond_b[k]) continue;
+    reached[k] = true;
+    front.push_back(k);
+  }
+  while (!front.empty()) {
+    const Contact& from = contacts[front.back()];
+    front.pop_back();
+    // One capsule between two is within the accuracy of capsules.
+    for (int a = from.number_a - 2; a <= from.number_a + 2; ++a) {
+      for (int b = from.number_b - 2; b <= from.number_b + 2; ++b) {
+        const auto found = places.find({a, b});
+        if (found == places.end() || reached[found->second]) continue;
+        reached[found->second] = true;
+        front.push_back(found->second);
+      }
+    }
+  }
+  return reached;
+}
+
+// The shortest way between the two places through a node at which both branches end, over the sum
+// of the radii there; 0 if there is no such node.
+double way_over_radii(const SmoothedTree& tree, const VesselContact& c) {
+  const CenterlineBranch& a = tree.tree.branches[index(c.first)];
+  const CenterlineBranch& b = tree.tree.branches[index(c.second)];
+  const BSplineCurve<4>& path_a = tree.paths[index(c.first)];
+  const BSplineCurve<4>& path_b = tree.paths[index(c.second)];
+  double way = std::numeric_limits<double>::infinity();
+  for (const auto& [node_a, way_a] :
+       {std::pair(a.from, c.first_along), {a.to, path_a.knots().last() - c.first_along}}) {
+    for (const auto& [node_b, way_b] :
+         {std::pair(b.from, c.second_along), {b.to, path_b.knots().last() - c.second_along}}) {
+      if (node_a == node_b) way = std::min(way, way_a + way_b);
+    }
+  }
+  if (!std::isfinite(way)) return 0.0;
+  return way / (path_a.at(c.first_along)(3) + path_b.at(c.second_along)(3));
+}
+
 }  // namespace
 
 std::vector<VesselContact> find_contacts(const SmoothedTree& tree, const OverlapOptions& options) {
@@ -238,8 +289,12 @@ std::vector<VesselContact> find_contacts(const SmoothedTree& tree, const Overlap
         same ? beyond_a
              : beyond_junction(found, &Contact::number_b, count[index(pair.second)],
                                meets(b.from, a), meets(b.to, a));
+    const std::vector<bool> own = hang_together(found, beyond_a, beyond_b);
     for (std::size_t k = 0; k < found.size(); ++k) {
-      if (beyond_a[k] && beyond_b[k]) result.push_back(found[k].vessels);
+      const VesselContact& vessels = found[k].vessels;
+      const bool beyond_both = beyond_a[k] && beyond_b[k];
+      const bool comes_back = !own[k] && way_over_radii(tree, vessels) > 0.5 * kReturnRadii;
+      if (beyond_both || comes_back) result.push_back(vessels);
     }
   }
   return result;

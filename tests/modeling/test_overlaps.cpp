@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "modeling/keep_apart.h"
 #include "modeling/merge_lines.h"
 #include "modeling/overlaps.h"
 #include "modeling/point_graph.h"
@@ -66,6 +67,51 @@ TEST(Overlaps, ABranchThatReturnsIntoItsParentIsReported) {
   const auto found = find_overlaps(tree);
   ASSERT_FALSE(found.empty());
   for (const Overlap& o : found) EXPECT_NE(o.first, o.second);
+}
+
+// A trunk, a straight daughter, and one that leaves with it, turns after `way` and comes back
+// across it, 0.9 beside its centerline, where the two may still overlap for their common junction.
+SmoothedTree returning_tree(double way) {
+  const auto branch = [](const std::string& name, int from, int to, double radius, int count) {
+    return CenterlineBranch{name, from, to, Points3(3, count),
+                            Eigen::VectorXd::Constant(count, radius)};
+  };
+  CenterlineTree tree;
+  tree.nodes = {
+      {"in", {-20, 0, 0}}, {"fork", {0, 0, 0}}, {"out", {30, 0, 0}}, {"back", {2.2, -12, 0.9}}};
+  tree.inlets = {0};
+  tree.branches = {branch("trunk", 0, 1, 1.0, 21), branch("straight", 1, 2, 0.8, 31),
+                   branch("returns", 1, 3, 0.7, 121)};
+  for (int i = 0; i <= 20; ++i) tree.branches[0].points_mm.col(i) = Vec3(i - 20, 0, 0);
+  for (int i = 0; i <= 30; ++i) tree.branches[1].points_mm.col(i) = Vec3(i, 0, 0);
+  // Out to (-1.6, way), a half circle, and straight back.
+  const double turn = std::numbers::pi * 1.9;
+  for (int i = 0; i <= 120; ++i) {
+    const double s = (2 * way + 12 + turn) * i / 120.0;
+    const double angle = std::clamp((s - way) / 1.9, 0.0, std::numbers::pi);
+    const double y = s < way          ? s
+                     : s < way + turn ? way + 1.9 * std::sin(angle)
+                                      : 2 * way + turn - s;
+    const double x = s < way ? -1.6 * s / way : 0.3 - 1.9 * std::cos(angle);
+    const double z = 0.9 * std::clamp((s - way) / turn, 0.0, 1.0);
+    tree.branches[2].points_mm.col(i) = Vec3(x, y, z);
+  }
+  const auto smooth = smooth_centerlines(tree);
+  EXPECT_TRUE(smooth.has_value());
+  return *smooth;
+}
+
+TEST(Overlaps, ABranchThatReturnsIntoItsSiblingBesideTheirJunctionIsReportedAndParted) {
+  const SmoothedTree tree = returning_tree(7.0);
+  const auto found = find_overlaps(tree);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(overlap_text(tree, found[0]).find("branches straight and returns overlap by "), 0U);
+  EXPECT_LT((found[0].at_mm - Vec3(2.2, 0, 0.45)).norm(), 0.4);
+  EXPECT_NEAR(found[0].depth_mm, 0.6, 0.1);
+  for (const VesselContact& c : find_contacts(tree)) {
+    EXPECT_GT(c.second_along, 10.0) << "what overlaps at the fork is the junction's";
+  }
+  EXPECT_TRUE(find_overlaps(keep_apart(tree), {0.1}).empty());
 }
 
 TEST(Overlaps, ABranchThatCrossesItselfIsReported) {
