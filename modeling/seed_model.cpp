@@ -65,8 +65,9 @@ JunctionSpec centered(const PlannedNode& node) {
   return spec;
 }
 
-// The junction with the options asked for; if that fails, with openings farther out; if its
-// branches do not meet in a point, then as if they did.
+// The junction with the options asked for; if that fails, with openings farther out. Branches that
+// do not meet in a point are first taken as if they did, with the openings where they are planned:
+// that is built sooner, and more often.
 BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& options,
                              const Progress& progress) {
   BuiltJunction built{node.spec, {}, node.error};
@@ -74,12 +75,15 @@ BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& opt
   const bool is_centered =
       std::all_of(node.spec.branches.begin(), node.spec.branches.end(),
                   [](const JunctionBranch& b) { return b.offset_mm.isZero(0); });
-  for (const double margin : {1.0, 1.6, 0.0}) {
-    if (margin == 0 && is_centered) break;
+  struct Try {
+    bool as_planned;
+    double margin;
+  };
+  for (const Try& next : {Try{is_centered, 1.0}, Try{true, is_centered ? 1.6 : 1.0}}) {
     JunctionOptions tried = options;
-    if (margin > 0) tried.margin *= margin;
+    tried.margin *= next.margin;
     Result<Junction> junction =
-        make_junction(margin > 0 ? node.spec : centered(node), tried, progress);
+        make_junction(next.as_planned ? node.spec : centered(node), tried, progress);
     if (junction) {
       built.junction = std::move(*junction);
       built.error.reset();

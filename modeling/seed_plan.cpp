@@ -239,6 +239,7 @@ void SeedPlan::merge(int b, const std::string& why) {
   a.spec.name = a.name;
   a.inlet = a.inlet || c.inlet;
   a.alive = true;
+  a.merged = true;
   for (const BranchEnd& end : c.ends) {
     PlannedBranch& moved = branches_[index(end.branch)];
     (end.at_end ? moved.to : moved.from) = kept;

@@ -46,12 +46,14 @@ struct PlannedNode {
   std::vector<BranchEnd> ends;
   bool alive = true;
   bool inlet = false;
+  bool merged = false;  // of two junctions or more
 
   // Of a junction, once it is measured; in the order of `ends`.
   JunctionSpec spec;
   std::vector<double> wanted_mm;  // distance of each opening with room to spare
   std::vector<double> least_mm;   // and with the least margin and blend
   std::vector<double> meets_mm;   // distance from which on the body follows the branch's path
+  std::vector<Vec3> begins_mm;    // from the centre to where each branch's ray begins
   std::vector<double> caps_mm;    // the branch leaves no room for an opening farther out
   std::optional<Error> error;     // why no openings could be found
   double reach = 1.0;             // directions are taken at this multiple of the openings' distance

@@ -15,6 +15,9 @@ constexpr double kLeastBlend = 0.4;   // of the blend asked for
 constexpr double kMergedOffset =
     0.2;  // branches that begin so far from their node were moved to it
 constexpr double kPartingRadii = 0.5;  // from where they began to where they are aimed at, at first
+// From so many branches of a merged node on their rays begin where they do: seen from the centre
+// they part only far out.
+constexpr std::size_t kManyBranches = 6;
 constexpr int kDirectionRounds = 16;
 constexpr int kMostRefused = 8;
 constexpr int kDamped = 3;    // from this round on steps are halved,
@@ -48,8 +51,8 @@ void SeedPlan::aim(PlannedNode& node, const std::vector<double>& distance) const
     Vec4 target = branch.at(end.at_end ? branch.length_mm() - s : s);
     const double radius = target(3);
     if (branch.straight) target.head<3>() = node_at({end.branch, !end.at_end}).center_mm;
-    const Vec3 chord = target.head<3>() - node.center_mm;
-    node.spec.branches[k] = {branch.name, chord.normalized(), radius, 0.0};
+    const Vec3 chord = target.head<3>() - node.center_mm - node.begins_mm[k];
+    node.spec.branches[k] = {branch.name, chord.normalized(), radius, 0.0, node.begins_mm[k]};
   }
 }
 
@@ -109,6 +112,7 @@ void SeedPlan::measure(PlannedNode& node) const {
   node.spec.center_mm = node.center_mm;
   node.spec.branches.assign(n, {});
   node.meets_mm.assign(n, 0.0);
+  node.begins_mm.assign(n, Vec3::Zero());
   node.caps_mm.resize(n, std::numeric_limits<double>::infinity());
   node.farther_mm.resize(n, 0.0);
   node.error.reset();
@@ -123,6 +127,9 @@ void SeedPlan::measure(PlannedNode& node) const {
     const double away = (first.head<3>() - node.center_mm).norm();
     if (away > kMergedOffset * first(3)) {
       node.meets_mm[k] = std::max(node.meets_mm[k], away + kPartingRadii * first(3));
+      if (node.merged && n >= kManyBranches && !branch.straight) {
+        node.begins_mm[k] = first.head<3>() - node.center_mm;
+      }
     }
   }
   if (!find_distances(node, distance)) return;
@@ -172,12 +179,13 @@ double SeedPlan::strain_at(const PlannedNode& node, std::size_t slot) const {
   if (way.norm() > 0.1 * r) {
     strain = std::acos(std::clamp(way.normalized().dot(opening.direction), -1.0, 1.0));
   }
-  const double off = (at(*along) - node.center_mm - distance * opening.direction).norm() / r;
+  const double off =
+      (at(*along) - node.center_mm - place_on_branch_mm(opening, distance)).norm() / r;
   if (off > kOnItsPath) strain += off;
   double sag = 0;
   const int steps = 1 + static_cast<int>(4 * *along / r);
   for (int i = 1; i < steps; ++i) {
-    const Vec3 arm = at(*along * i / steps) - node.center_mm;
+    const Vec3 arm = at(*along * i / steps) - node.center_mm - opening.offset_mm;
     if (arm.norm() < r) continue;
     sag = std::max(sag, (arm - arm.dot(opening.direction) * opening.direction).norm() / r);
   }
