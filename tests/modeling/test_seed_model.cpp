@@ -252,6 +252,30 @@ TEST(SeedModel, JunctionsTooNearEachOtherBecomeOneAndSaySo) {
   expect_smooth(model->network);
 }
 
+// Four forks a radius apart along a trunk become one junction of six branches, most of which begin
+// well beside its centre.
+TEST(SeedModel, ManyJunctionsTooNearEachOtherBecomeOneOfSixBranches) {
+  TreeMaker maker;
+  const int root = maker.node({0, 0, -16}, "root");
+  const Vec3 sides[] = {{12, 0, -2}, {0, 12, -1}, {-12, 0, 1}, {0, -12, 2}};
+  int before = root;
+  for (int k = 0; k < 4; ++k) {
+    const Vec3 place(0, 0, 1.2 * k);
+    const int fork = maker.node(place, std::string(1, static_cast<char>('a' + k)));
+    maker.line(before, fork, 1.2);
+    maker.line(fork, maker.node(place + sides[k], "side" + std::to_string(k)), 0.8);
+    before = fork;
+  }
+  maker.line(before, maker.node({0, 0, 18}, "tip"), 1.0);
+  maker.tree.inlets = {root};
+  const Result<Model> model = seed_model(maker.tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(model->failed.empty());
+  EXPECT_EQ(model->network.rims.size(), 6u);
+  EXPECT_EQ(model->network.regions.size(), 7u);
+  expect_smooth(model->network);
+}
+
 // A trunk with two forks; `spoil` makes the second one impossible.
 Result<Model> forked_tree(const std::function<void(TreeMaker&, int)>& spoil) {
   TreeMaker maker;
