@@ -38,8 +38,8 @@ struct ReproducedTable {
   double seconds = 0.0;
 };
 
-// 7.1 and rings (region growing), 7.2 to 7.5 (contours), cylinder, potato, 7.6 (noise), vessel, bifurcation
-// (surfaces), smoothing (7.2.4): in this order.
+// 7.1 and rings (region growing), 7.2 to 7.5 (contours), cylinder, potato, 7.6 (noise), vessel,
+// bifurcation (surfaces), smoothing (7.2.4): in this order.
 const std::vector<std::string>& reproducible_tables();
 
 struct ReproduceOptions {
