@@ -53,7 +53,7 @@ class AdaptiveThreshold {
 
   // Grey value with vessels bright; not-a-number counts as darker than anything.
   double grey(const Voxel& v) const {
-    const double value = static_cast<double>(values_.at(v));
+    const double value = values_.at(v);
     if constexpr (std::is_floating_point_v<T>)
       if (!std::isfinite(value)) return -std::numeric_limits<double>::infinity();
     return sign_ * value;

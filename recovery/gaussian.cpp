@@ -216,7 +216,8 @@ Image<T> smoothed(Image<T> image, double sigma_mm) {
 }
 
 template <typename T>
-Image<T> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high, double sigma_mm) {
+Image<float> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high,
+                          double sigma_mm) {
   EXPECTS(sigma_mm >= 0 && image.grid.contains(low) && image.grid.contains(high));
   const auto kernels = kernels_of(image.grid, sigma_mm);
   ImageGrid grid = image.grid;
@@ -229,7 +230,7 @@ Image<T> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high
     first[k] = low[k] - reach;
   }
   grid.origin_mm = image.grid.world_mm(low);
-  Image<T> out(grid);
+  Image<float> out(grid);
   // The border's value goes on beyond the border.
   const auto at = [&](int x, int y, int z) {
     return image[{std::clamp(first[0] + x, 0, image.grid.size[0] - 1),
@@ -245,7 +246,7 @@ Image<T> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high
       for (int x = 0; x < values.size[0]; ++x) {
         const T v = at(x, y, z);
         if (sigma_mm == 0) {
-          out[{x, y, z}] = v;
+          out[{x, y, z}] = static_cast<float>(v);
           continue;
         }
         all_finite = all_finite && is_finite(v);
@@ -261,19 +262,19 @@ Image<T> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high
   }
   for (std::size_t i = 0; i < out.voxels.size(); ++i) {
     if (all_finite) {
-      out.voxels[i] = rounded<T>(values.values[i]);
+      out.voxels[i] = values.values[i];
       continue;
     }
     const Voxel v = grid.voxel(i);
     const T own = image[{low[0] + v[0], low[1] + v[1], low[2] + v[2]}];
-    out.voxels[i] = is_finite(own) ? rounded<T>(values.values[i] / share.values[i]) : own;
+    out.voxels[i] = is_finite(own) ? values.values[i] / share.values[i] : static_cast<float>(own);
   }
   return out;
 }
 
-AnyImage smoothed_box(const AnyImage& image, const Voxel& low, const Voxel& high, double sigma_mm) {
-  return std::visit([&](const auto& i) { return AnyImage(smoothed_box(i, low, high, sigma_mm)); },
-                    image);
+Image<float> smoothed_box(const AnyImage& image, const Voxel& low, const Voxel& high,
+                          double sigma_mm) {
+  return std::visit([&](const auto& i) { return smoothed_box(i, low, high, sigma_mm); }, image);
 }
 
 AnyImage smoothed(AnyImage image, double sigma_mm) {
@@ -283,7 +284,7 @@ AnyImage smoothed(AnyImage image, double sigma_mm) {
 
 #define ANGIOSPLINE_INSTANTIATE(T)              \
   template Image<T> smoothed(Image<T>, double); \
-  template Image<T> smoothed_box(const Image<T>&, const Voxel&, const Voxel&, double);
+  template Image<float> smoothed_box(const Image<T>&, const Voxel&, const Voxel&, double);
 ANGIOSPLINE_INSTANTIATE(std::uint8_t)
 ANGIOSPLINE_INSTANTIATE(std::int8_t)
 ANGIOSPLINE_INSTANTIATE(std::uint16_t)

@@ -17,11 +17,14 @@ template <typename T>
 Image<T> smoothed(Image<T> image, double sigma_mm);
 AnyImage smoothed(AnyImage image, double sigma_mm);
 
-// The voxels from `low` to `high`, both included, of what smoothed(image, sigma_mm) would be, at
-// the cost of the box and a margin of three deviations. The same bits, but for rounding where an
-// image has voxels that are not finite. Requires a box within the image.
+// The voxels from `low` to `high`, both included, of what the image smoothed in float would be, at
+// the cost of the box and a margin of three deviations. Whatever the pixel type, equal grey values
+// give equal bits: those of smoothed(Image<float>), but for rounding where an image has voxels that
+// are not finite. Requires a box within the image.
 template <typename T>
-Image<T> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high, double sigma_mm);
-AnyImage smoothed_box(const AnyImage& image, const Voxel& low, const Voxel& high, double sigma_mm);
+Image<float> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high,
+                          double sigma_mm);
+Image<float> smoothed_box(const AnyImage& image, const Voxel& low, const Voxel& high,
+                          double sigma_mm);
 
 }  // namespace angiospline

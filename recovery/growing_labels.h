@@ -154,7 +154,8 @@ class LabelledMoments {
   Store runs_;
 };
 
-// The grey values of an image, smoothed where they are first asked for.
+// The grey values of an image, smoothed where they are first asked for. Smoothed values are float
+// whatever the image is: rounded to integers, ties in the queue and levels would follow the type.
 template <typename T>
 class GreyValues {
  public:
@@ -163,16 +164,16 @@ class GreyValues {
         smoothing_mm_(smoothing_mm),
         smooth_(smoothing_mm > 0 ? image.grid.size : Voxel{0, 0, 0}) {}
 
-  T at(const Voxel& v) const {
-    if (smoothing_mm_ == 0) return image_[v];
+  double at(const Voxel& v) const {
+    if (smoothing_mm_ == 0) return static_cast<double>(image_[v]);
     const Cube* cube = smooth_.find(v[0], v[1], v[2]);
     if (cube == nullptr) cube = &load(v);
-    return cube->grey[Store::within(v[0], v[1], v[2])];
+    return static_cast<double>(cube->grey[Store::within(v[0], v[1], v[2])]);
   }
 
  private:
   struct Cube {
-    std::array<T, 4096> grey;
+    std::array<float, 4096> grey;
   };
   using Store = Bricks<Cube, 4>;
 
@@ -182,7 +183,7 @@ class GreyValues {
       low[k] = v[k] & ~(Store::kEdge - 1);
       high[k] = std::min(image_.grid.size[k] - 1, v[k] | (Store::kEdge - 1));
     }
-    const Image<T> box = smoothed_box(image_, low, high, smoothing_mm_);
+    const Image<float> box = smoothed_box(image_, low, high, smoothing_mm_);
     Cube& cube = smooth_.touch(v[0], v[1], v[2]);
     std::size_t i = 0;
     for_each({low, high},

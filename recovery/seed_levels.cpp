@@ -36,14 +36,14 @@ Cube cube_around(const AnyImage& image, const Voxel& centre, double half_mm, dou
     high[i] = std::min(grid.size[i] - 1, centre[i] + half);
     size[i] = high[i] - low[i] + 1;
   }
-  const AnyImage box = smoothed_box(image, low, high, smoothing_mm);
+  const Image<float> box = smoothed_box(image, low, high, smoothing_mm);
   Cube cube;
   cube.grey.grid.size = size;
   cube.seed = {centre[0] - low[0], centre[1] - low[1], centre[2] - low[2]};
   for (int z = 0; z < size[2]; ++z)
     for (int y = 0; y < size[1]; ++y)
       for (int x = 0; x < size[0]; ++x) {
-        const double v = sign * value_at(box, {x, y, z});
+        const double v = sign * static_cast<double>(box[{x, y, z}]);
         cube.grey.voxels.push_back(v);
         if (std::isfinite(v)) cube.values.push_back(v);
       }
@@ -144,13 +144,13 @@ BrightVoxel brightest_near(const AnyImage& image, const Voxel& middle, int reach
     low[k] = std::max(0, middle[k] - reach);
     high[k] = std::min(grid.size[k] - 1, middle[k] + reach);
   }
-  const AnyImage box = smoothed_box(image, low, high, smoothing_mm);
+  const Image<float> box = smoothed_box(image, low, high, smoothing_mm);
   const auto grey = [&](const Voxel& v) {
-    return sign * value_at(box, {v[0] - low[0], v[1] - low[1], v[2] - low[2]});
+    return sign * static_cast<double>(box[{v[0] - low[0], v[1] - low[1], v[2] - low[2]}]);
   };
   BrightVoxel best{middle, grey(middle)};
-  for (std::size_t i = 0; i < grid_of(box).voxel_count(); ++i) {
-    const Voxel u = grid_of(box).voxel(i);
+  for (std::size_t i = 0; i < box.voxels.size(); ++i) {
+    const Voxel u = box.grid.voxel(i);
     const Voxel v{low[0] + u[0], low[1] + u[1], low[2] + u[2]};
     if (grey(v) > best.grey) best = {v, grey(v)};
   }

@@ -8,9 +8,9 @@
 
 #include "recovery/morphology.h"
 #include "recovery/seed_levels.h"
+#include "recovery/seed_search.h"
 #include "recovery/topology_numbers.h"
 #include "recovery/tunnels.h"
-#include "recovery/vesselness.h"
 
 namespace angiospline {
 
@@ -193,11 +193,10 @@ std::vector<Vec3> seeds_beyond(const AnyImage& image, const std::vector<Vec3>& s
 // Grows again with higher and higher background thresholds as long as the mask leaks; seeds that
 // were found and are darker were none of vessels. The last attempt if none is sound.
 Result<Attempt> without_leak(const AnyImage& image, SegmentOptions options, Attempt leaking,
+                             const std::vector<std::string>& first_choices,
                              const Progress& progress) {
   constexpr int kAttempts = 8;
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
-  std::vector<std::string> first_choices;
-  if (leaking.report.seeds_found) first_choices.push_back(leaking.report.choices.front());
   for (int k = 0; k < kAttempts && leaking.leaks(); ++k) {
     SegmentReport report;
     report.seeds_found = leaking.report.seeds_found;
@@ -292,25 +291,25 @@ Result<Segmented> segment(const AnyImage& image, const SegmentOptions& options,
   if (options.seeds_mm.empty()) {
     SeedSearchOptions seed_options;
     seed_options.polarity = options.polarity;
-    Result<std::vector<Vec3>> seeds = find_seeds(image, seed_options, progress);
+    Result<SeedSearch> seeds = find_seeds(image, seed_options, progress);
     if (!seeds) return fail(seeds.error());
-    if (seeds->empty())
+    if (seeds->kept.empty())
       return fail({ErrorKind::kFailed,
                    "no vessel was found",
                    "segment",
                    {},
                    "nothing in the image looks like a tube: give a seed"});
-    report.seeds_mm = std::move(*seeds);
+    for (const TubularStructure& s : seeds->kept) report.seeds_mm.push_back(s.core_mm);
     report.seeds_found = true;
-    report.choices.push_back(fmt::format("{} seeds in the cores of the most tubular structures",
-                                         report.seeds_mm.size()));
+    report.choices.push_back(
+        fmt::format("{} seeds in the cores of the brightest tubes", report.seeds_mm.size()));
+    report.choices.insert(report.choices.end(), seeds->left_out.begin(), seeds->left_out.end());
   }
   if (progress.should_stop()) return fail(cancelled("segment"));
-  Result<Attempt> done = options.background
-                             ? attempt(image, options, std::move(report), kNoLimit, progress)
-                             : cautious_attempt(image, options, report, progress);
+  Result<Attempt> done = options.background ? attempt(image, options, report, kNoLimit, progress)
+                                            : cautious_attempt(image, options, report, progress);
   if (done && done->leaks() && !options.background && done->report.levels)
-    done = without_leak(image, options, std::move(*done), progress);
+    done = without_leak(image, options, std::move(*done), report.choices, progress);
   if (!done) return fail(done.error());
   if (done->leaks())
     done->report.warnings.push_back(leak_warning(*done));

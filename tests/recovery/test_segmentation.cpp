@@ -77,14 +77,15 @@ TEST(Gaussian, OfABoxIsTheBoxOfTheWhole) {
   Random random(8);
   ImageGrid grid{{19, 12, 9}, Vec3(0.5, 0.8, 1.1), Vec3(3, 2, 1), Mat3::Identity()};
   Image<std::int16_t> whole(grid);
-  Image<float> with_holes(grid);
+  Image<float> in_float(grid), with_holes(grid);
   for (std::size_t i = 0; i < whole.voxels.size(); ++i) {
     whole.voxels[i] = static_cast<std::int16_t>(std::lround(3000 * random.gaussian()));
+    in_float.voxels[i] = whole.voxels[i];
     with_holes.voxels[i] = random.uniform() < 0.05 ? std::numeric_limits<float>::quiet_NaN()
                                                    : static_cast<float>(random.gaussian());
   }
   for (const double sigma : {0.0, 0.4, 1.0}) {
-    const Image<std::int16_t> all = smoothed(whole, sigma);
+    const Image<float> all = smoothed(in_float, sigma);
     const Image<float> all_with_holes = smoothed(with_holes, sigma);
     for (const auto& [low, high] :
          {std::pair{Voxel{0, 0, 0}, Voxel{18, 11, 8}}, std::pair{Voxel{5, 4, 3}, Voxel{7, 9, 3}},
@@ -106,58 +107,6 @@ TEST(Gaussian, OfABoxIsTheBoxOfTheWhole) {
   }
 }
 
-TEST(Vesselness, AnswersToTubesAndNotToSheetsOrBalls) {
-  ImageGrid grid;
-  grid.size = {41, 41, 41};
-  Image<float> tube(grid), sheet(grid), ball(grid);
-  for (std::size_t i = 0; i < tube.voxels.size(); ++i) {
-    const Voxel v = grid.voxel(i);
-    const double x = v[0] - 20, y = v[1] - 20, z = v[2] - 20;
-    tube.voxels[i] = x * x + y * y <= 9 ? 100.0F : 0.0F;
-    sheet.voxels[i] = std::abs(x) <= 3 ? 100.0F : 0.0F;
-    ball.voxels[i] = x * x + y * y + z * z <= 9 ? 100.0F : 0.0F;
-  }
-  const auto middle = [](const Image<float>& image) { return (*vesselness(image))[{20, 20, 20}]; };
-  EXPECT_GT(middle(tube), 3 * middle(sheet));
-  EXPECT_GT(middle(tube), 3 * middle(ball));
-  EXPECT_GT(middle(tube), 10);
-  Image<float> negative = tube;
-  for (float& v : negative.voxels) v = -v;
-  EXPECT_EQ(middle(negative), 0);
-}
-
-TEST(Seeds, LieInTheVesselWhateverTheGrid) {
-  for (const Vec3& spacing : {Vec3(1, 1, 1), Vec3(0.8, 0.8, 2)}) {
-    PhantomOptions o;
-    o.spacing_mm = spacing;
-    o.snr = 6;
-    o.origin_mm = Vec3(-50, 20, 7);
-    o.direction << 0, 1, 0, -1, 0, 0, 0, 0, 1;
-    const auto p = make_phantom(PhantomKind::kBifurcation, o);
-    ASSERT_TRUE(p.has_value());
-    const auto seeds = find_seeds(p->image);
-    ASSERT_TRUE(seeds.has_value());
-    ASSERT_FALSE(seeds->empty());
-    for (const Vec3& seed : *seeds) {
-      const Vec3 at = p->truth.grid.index_vox(seed);
-      const Voxel v{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
-                    static_cast<int>(std::lround(at[2]))};
-      EXPECT_EQ(p->truth[v], 1);
-    }
-  }
-}
-
-TEST(Seeds, AreNoneInAnImageOfOneGreyValue) {
-  ImageGrid grid;
-  grid.size = {20, 20, 20};
-  const auto seeds = find_seeds(Image<float>(grid, 3.0F));
-  ASSERT_TRUE(seeds.has_value());
-  EXPECT_TRUE(seeds->empty());
-  const auto s = segment(Image<float>(grid, 3.0F));
-  ASSERT_FALSE(s.has_value());
-  EXPECT_EQ(s.error().what, "no vessel was found");
-}
-
 TEST(Segment, FindsANoisyTreeWithoutAnyParameter) {
   for (const double snr : {8.0, 4.0}) {
     const Phantom p = noisy_tree(snr);
@@ -174,6 +123,38 @@ TEST(Segment, FindsANoisyTreeWithoutAnyParameter) {
     EXPECT_LE(c->result_topology.cycles, 2);
     EXPECT_LT(c->surface->mean_mm, 0.5);
   }
+}
+
+template <typename T>
+Image<T> as(const Image<float>& image) {
+  Image<T> out(image.grid);
+  std::transform(image.voxels.begin(), image.voxels.end(), out.voxels.begin(),
+                 [](float v) { return static_cast<T>(v); });
+  return out;
+}
+
+// Few grey values, so that their smoothed values would tie if they were rounded.
+TEST(Segment, GivesTheSameMaskWhateverThePixelType) {
+  const Phantom p = noisy_tree(4);
+  Image<float> few(p.image.grid);
+  for (std::size_t i = 0; i < few.voxels.size(); ++i)
+    few.voxels[i] =
+        std::clamp(std::round(0.05F * static_cast<float>(p.image.voxels[i])) + 40.0F, 0.0F, 127.0F);
+  SegmentOptions given;
+  given.seeds_mm = {p.tree.branches.front().points_mm.col(8)};
+  const auto expect_same = [](const Result<Segmented>& typed, const Result<Segmented>& in_float) {
+    ASSERT_TRUE(typed && in_float);
+    EXPECT_EQ(typed->mask.voxels, in_float->mask.voxels);
+    EXPECT_EQ(typed->report.choices, in_float->report.choices);
+  };
+  const auto in_float = segment(few, given);
+  EXPECT_GT(compare_masks(p.truth, in_float->mask)->dice, 0.95);
+  for (const AnyImage& image : {AnyImage(as<std::uint8_t>(few)), AnyImage(as<std::int8_t>(few)),
+                                AnyImage(as<std::int16_t>(few)), AnyImage(as<double>(few))}) {
+    SCOPED_TRACE(pixel_type_name(image));
+    expect_same(segment(image, given), in_float);
+  }
+  expect_same(segment(as<std::uint8_t>(few)), segment(few));
 }
 
 TEST(Segment, HasNoCliffInM) {
