@@ -23,6 +23,7 @@ constexpr double kWorthTightening = 0.05;  // radii by which an opening must com
 constexpr double kStraightEnough = 0.7;    // chord over arc of a branch that may be taken straight
 constexpr double kDeepestSag = 0.75;       // radii between a branch and the chord it is taken for
 constexpr double kLongestExtension = 4;    // of a free end that lies within its junction, in radii
+constexpr double kInnerLoop = 3.0;  // of the largest radius there and its own, to its far side
 constexpr int kPlanRounds = 64;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -284,6 +285,35 @@ bool SeedPlan::drop_twins(int n) {
   return false;
 }
 
+// Where no openings can be found, a loop that does not come out of the lumens that meet there is
+// why: both its ends lead to one place. The smallest such goes; true if there was one.
+bool SeedPlan::drop_inner_loop(int n) {
+  const PlannedNode& node = nodes_[index(n)];
+  if (!node.error) return false;
+  const auto radius_at = [&](BranchEnd end) {
+    const PlannedBranch& branch = branches_[index(end.branch)];
+    return branch.at(end.at_end ? branch.length_mm() : 0.0)(3);
+  };
+  double widest = 0;
+  for (const BranchEnd& end : node.ends) widest = std::max(widest, radius_at(end));
+  int smallest = -1;
+  double least = kInnerLoop;
+  for (const BranchEnd& end : node.ends) {
+    const PlannedBranch& branch = branches_[index(end.branch)];
+    if (end.at_end || branch.from != branch.to) continue;
+    const double far =
+        (branch.samples.topRows<3>().colwise() - node.center_mm).colwise().norm().maxCoeff();
+    const double reach = far / (widest + branch.samples.row(3).mean());
+    if (reach < least) {
+      least = reach;
+      smallest = end.branch;
+    }
+  }
+  if (smallest < 0) return false;
+  drop(smallest, "a loop that lies inside its junction");
+  return true;
+}
+
 // A free end is moved outward along its last direction.
 void SeedPlan::extend(int b, double missing) {
   PlannedBranch& branch = branches_[index(b)];
@@ -464,6 +494,7 @@ void SeedPlan::settle() {
       for (const BranchEnd& end : nodes_[index(n)].ends) look[index(end.branch)] = 1;
     }
     std::fill(dirty_.begin(), dirty_.end(), 0);
+    for (const int n : work) drop_inner_loop(n);
 
     struct Short {
       int branch;
@@ -578,13 +609,23 @@ bool SeedPlan::merge_along(int b) {
 bool SeedPlan::merge_with_nearest(int n, double radii) {
   int best = -1;
   double shortest = radii;
-  for (const BranchEnd& end : nodes_[index(n)].ends) {
+  const std::vector<BranchEnd>& ends = nodes_[index(n)].ends;
+  // Of branches that lead to one other junction none has its length to itself: near that junction
+  // all look the same way.
+  const auto beside = [&](const PlannedBranch& branch) {
+    return std::count_if(ends.begin(), ends.end(), [&](const BranchEnd& end) {
+      const PlannedBranch& other = branches_[index(end.branch)];
+      return std::minmax(other.from, other.to) == std::minmax(branch.from, branch.to);
+    });
+  };
+  for (const BranchEnd& end : ends) {
     const PlannedBranch& branch = branches_[index(end.branch)];
     if (branch.from == branch.to || !nodes_[index(branch.from)].is_junction() ||
         !nodes_[index(branch.to)].is_junction()) {
       continue;
     }
-    const double length = branch.length_mm() / branch.samples.row(3).mean();
+    const double length =
+        branch.length_mm() / branch.samples.row(3).mean() / static_cast<double>(beside(branch));
     if (length < shortest) {
       shortest = length;
       best = end.branch;

@@ -108,6 +108,7 @@ class SeedPlan {
   bool share_room(int branch);
   bool tighten();
   bool drop_twins(int node);
+  bool drop_inner_loop(int node);
   void extend(int branch, double missing_mm);
   void drop(int branch, const std::string& why);
   void merge(int branch, const std::string& why);

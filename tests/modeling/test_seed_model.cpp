@@ -313,6 +313,60 @@ TEST(SeedModel, TwoBranchesInTheSameDirectionAreNamedAndTheRestIsThere) {
                   {"bad_b"});
 }
 
+std::size_t times_named(const std::vector<std::string>& texts, const std::string& name) {
+  return static_cast<std::size_t>(
+      std::count_if(texts.begin(), texts.end(),
+                    [&](const std::string& text) { return text.find(name) != std::string::npos; }));
+}
+
+// A tunnel that noise left in a mask at a fork: its way round is no longer than the lumen is wide.
+TEST(SeedModel, ALoopWithinTheLumensOfItsJunctionIsLeftOutAndNamedOnce) {
+  for (const bool fork : {true, false}) {
+    const Result<Model> model = forked_tree([fork](TreeMaker& maker, int bad) {
+      maker.line(bad, maker.node({-16, 0, 24}, "a"), 0.9);
+      if (fork) maker.line(bad, maker.node({-18, 4, 14}, "b"), 0.8);
+      const Vec3 at = maker.tree.nodes[static_cast<std::size_t>(bad)].position_mm;
+      maker.branch(bad, bad, 0.3, [at](double t) {  // out and back as a hairpin
+        const double a = 2 * kPi * t;
+        return Vec3(at + Vec3(0.8 * (1 - std::cos(a)), 0.3 * std::sin(a), 0.2 * std::sin(a)));
+      });
+    });
+    expect_the_rest(model, {});
+    EXPECT_TRUE(model->failed.empty()) << model->failed[0].why;
+    EXPECT_EQ(times_named(model->warnings, "bad_bad"), 1U);
+    EXPECT_EQ(times_named(model->warnings, "loop that lies inside its junction"), 1U);
+    EXPECT_EQ(model->network.rims.size(), fork ? 4U : 3U);
+  }
+}
+
+// Strands of a lumen that noise has torn: three ways between junctions that are too near for an
+// opening at each end.
+TEST(SeedModel, StrandsOfATornLumenAreLeftOutAndNamed) {
+  Random random(54);
+  TreeMaker maker;
+  const double length = random.uniform(6, 8);
+  const int a = maker.node({0, 0, 0}, "a");
+  const int b = maker.node({0, 0, length}, "b");
+  maker.tree.inlets = {maker.node({random.uniform(-10, 10), random.uniform(5, 15), -40}, "root")};
+  maker.line(maker.tree.inlets[0], a, random.uniform(1.5, 2.6));
+  for (int k = 0; k < 3; ++k) {
+    const double side = k == 0 ? 0.01 : random.uniform(k == 1 ? 3 : 0, 5);
+    const double angle = random.uniform(0, 2 * kPi);
+    const double radius = k == 1 ? random.uniform(1.5, 2.2) : random.uniform(0.7, 1.3);
+    maker.branch(a, b, radius, [=](double t) {
+      const double away = side * std::sin(kPi * t);
+      return Vec3(away * std::cos(angle), away * std::sin(angle), length * t);
+    });
+  }
+  maker.line(b, maker.node({-8, 9, length + 12}, "tip"), random.uniform(0.8, 1.4));
+  const Result<Model> model = seed_model(maker.tree);
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(model->failed.empty()) << model->failed[0].why;
+  EXPECT_EQ(rim_names(model->network), (std::set<std::string>{"inlet", "outlet_tip"}));
+  EXPECT_GE(times_named(model->warnings, "a_b"), 1U);
+  expect_smooth(model->network);
+}
+
 TEST(SeedModel, ABranchThatRunsBackThroughItsJunctionIsNamedAndTheRestIsThere) {
   expect_the_rest(forked_tree([](TreeMaker& maker, int bad) {
                     maker.line(bad, maker.node({-16, 0, 24}, "a"), 0.9);
