@@ -170,6 +170,7 @@ void trees() {
     double bias = 0.0;
     double lost = 0.0;
     int points = 0;
+    std::size_t contacts = 0;
     for (std::uint64_t seed = 0; seed < 50; ++seed) {
       const CenterlineTree truth = grown(120, 6, 1.5, 31, seed);
       Random random(seed + 100);
@@ -179,6 +180,7 @@ void trees() {
       ends += m.ends;
       junctions += m.junctions;
       branches += m.branches;
+      contacts += v.contacts.size();
       offset += e.mean_mm * e.points;
       bias += e.radius_bias * e.points;
       points += e.points;
@@ -187,9 +189,10 @@ void trees() {
     }
     fmt::print(
         "50 trees, SNR {:>4}: F1 ends {:.3f} junctions {:.3f} branches {:.3f} of {}; off centre "
-        "mean {:.3f} worst {:.2f} voxel, radius bias {:+.1f} %, tips lost at most {:.1f} voxel\n",
+        "mean {:.3f} worst {:.2f} voxel, radius bias {:+.1f} %, tips lost at most {:.1f} voxel; {} "
+        "contacts\n",
         snr == 0.0 ? "none" : fmt::format("{}", snr), ends.f1(), junctions.f1(), branches.f1(),
-        branches.truth, offset / points, worst, 100.0 * bias / points, lost);
+        branches.truth, offset / points, worst, 100.0 * bias / points, lost, contacts);
   }
 }
 

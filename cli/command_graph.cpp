@@ -56,9 +56,7 @@ int run_graph(const GraphArguments& arguments) {
     print_json(json);
   }
   for (const VesselContact& contact : vessels->contacts)
-    console.say(fmt::format("note: {} at {:.4g},{:.4g},{:.4g} mm{}",
-                            contact.kind == ContactKind::kKissing ? "two vessels touch"
-                                                                  : "a bridge between two vessels",
+    console.say(fmt::format("note: {} at {:.4g},{:.4g},{:.4g} mm{}", words_for(contact.kind),
                             contact.at_mm.x(), contact.at_mm.y(), contact.at_mm.z(),
                             vessels->contacts_cut > 0 ? ": cut" : " (--cut-contacts parts them)"));
   console.say(fmt::format("{} nodes, {} branches, {} cycles, {} components; {} twigs pruned",

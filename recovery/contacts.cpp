@@ -21,6 +21,12 @@ constexpr double kLongestBridge = 2.0;
 constexpr double kThinBridge = 0.6;
 constexpr double kOnward = 3.0;  // radii that an axis goes on straight beyond its exits
 constexpr double kExit = 1.5;    // lumen radii from a junction to where a branch is itself
+constexpr double kWaist = 0.8;   // between vessels that touch where one of them forks
+constexpr std::size_t kMostExits = 8;
+constexpr double kNeck = 0.7;        // of an end at a side, against the thinner vessel
+constexpr double kSearched = 6.0;    // lumen radii from a junction in which a branch is itself
+constexpr double kGoesOn = 3.0;      // radii of a vessel beyond its neck, at least
+constexpr double kEndToAxis = 0.75;  // radii from a vessel's end to where its axis begins
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
@@ -132,13 +138,13 @@ std::optional<VesselContact> contact_of(const std::array<Exit, 4>& e,
   return contact;
 }
 
-// Whether the mask is thinner between the two vessels than they are.
-bool has_waist(const Mask& mask, const VesselContact& contact) {
+// Whether the mask is thinner between the two vessels than `share` of the thinner one.
+bool has_waist(const Mask& mask, const VesselContact& contact, double share) {
   const Vec3 at = mask.grid.index_vox(contact.at_mm);
   const Voxel v{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
                 static_cast<int>(std::lround(at[2]))};
   if (!mask.grid.contains(v) || mask[v] == 0) return true;
-  return radius_at(mask, v) < kThinBridge * std::min(contact.a.radius_mm, contact.b.radius_mm);
+  return radius_at(mask, v) < share * std::min(contact.a.radius_mm, contact.b.radius_mm);
 }
 
 // Of the three ways to pair four exits the likeliest that is a contact. Where vessels run side by
@@ -154,7 +160,62 @@ std::optional<VesselContact> contact_of(const std::vector<Exit>& e, std::optiona
                    [&](const auto& p, const auto& q) { return cost(p) < cost(q); });
   for (std::size_t k = 0; k < ways.size(); ++k) {
     auto contact = contact_of(ways[k], bridge_mm, voxel_mm(mask.grid));
-    if (contact && (k == 0 || has_waist(mask, *contact))) return contact;
+    if (contact && (k == 0 || has_waist(mask, *contact, kThinBridge))) return contact;
+  }
+  return std::nullopt;
+}
+
+// One of more than four exits joins the vessel of whose axis it is the fewer radii away.
+void add_branch(VesselContact& contact, const Exit& e, double step_mm) {
+  const auto nearest = [&](const ContactVessel& vessel) {
+    Eigen::Index at = 0;
+    (vessel.axis_mm.colwise() - e.at).colwise().squaredNorm().minCoeff(&at);
+    return Vec3(vessel.axis_mm.col(at));
+  };
+  const Vec3 of_a = nearest(contact.a), of_b = nearest(contact.b);
+  const bool is_of_a =
+      (e.at - of_a).norm() * contact.b.radius_mm <= (e.at - of_b).norm() * contact.a.radius_mm;
+  const Vec3 from = is_of_a ? of_a : of_b;
+  const double length = (e.at - from).norm();
+  const int inside = static_cast<int>(std::ceil(length / step_mm));
+  const int beyond = static_cast<int>(std::ceil(kOnward * e.radius / step_mm));
+  Points3& axis = (is_of_a ? contact.a : contact.b).axis_mm;
+  const Eigen::Index first = axis.cols();
+  axis.conservativeResize(3, first + inside + beyond);
+  for (int k = 1; k <= inside; ++k) axis.col(first + k - 1) = from + k * (e.at - from) / inside;
+  for (int k = 1; k <= beyond; ++k)
+    axis.col(first + inside + k - 1) = e.at + k * step_mm * e.outward;
+}
+
+// Of all ways to take two pairs out of five exits or more the likeliest that is a contact with a
+// waist.
+std::optional<VesselContact> contact_among(const std::vector<Exit>& e,
+                                           std::optional<double> bridge_mm, const Mask& mask) {
+  struct Way {
+    std::array<std::size_t, 4> of;
+    double cost;
+  };
+  std::vector<Way> ways;
+  const std::size_t n = e.size();
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = i + 1; j < n; ++j)
+      for (std::size_t k = i + 1; k < n; ++k)
+        for (std::size_t l = k + 1; l < n; ++l)
+          if (k != j && l != j)
+            ways.push_back({{i, j, k, l}, unlikeness(e[i], e[j]) + unlikeness(e[k], e[l])});
+  std::stable_sort(ways.begin(), ways.end(),
+                   [](const Way& p, const Way& q) { return p.cost < q.cost; });
+  const double voxel = voxel_mm(mask.grid);
+  for (const Way& way : ways) {
+    const auto& [i, j, k, l] = way.of;
+    auto contact = contact_of(std::array{e[i], e[j], e[k], e[l]}, bridge_mm, voxel);
+    if (!contact || !has_waist(mask, *contact, kWaist)) continue;
+    const double thinner = std::min(contact->a.radius_mm, contact->b.radius_mm);
+    if (bridge_mm && *bridge_mm >= kWaist * thinner) continue;
+    for (std::size_t m = 0; m < n; ++m)
+      if (std::find(way.of.begin(), way.of.end(), m) == way.of.end())
+        add_branch(*contact, e[m], 0.5 * voxel);
+    return contact;
   }
   return std::nullopt;
 }
@@ -168,17 +229,22 @@ class ContactFinder {
   }
 
   std::vector<VesselContact> find() {
-    for (std::size_t n = 0; n < graph_.nodes.size(); ++n) {
-      const std::vector<int>& arcs = graph_.nodes[n].arcs;
-      if (arcs.size() == 4) look({{static_cast<int>(n), -1}}, std::nullopt);
-      if (arcs.size() != 3) continue;
+    const auto count = static_cast<int>(graph_.nodes.size());
+    found_.assign(graph_.nodes.size(), 0);
+    for (int n = 0; n < count; ++n) {
+      const std::vector<int>& arcs = graph_.nodes[index(n)].arcs;
+      if (arcs.size() >= 4) look({{n, -1}}, std::nullopt);
+      if (arcs.size() < 3) continue;
       for (const int a : arcs) {
         const VesselArc& arc = graph_.arcs[index(a)];
-        const int other = arc.from == static_cast<int>(n) ? arc.to : arc.from;
-        if (other <= static_cast<int>(n) || graph_.nodes[index(other)].arcs.size() != 3) continue;
-        look({{static_cast<int>(n), a}, {other, a}}, thinnest(arc));
+        const int other = arc.from == n ? arc.to : arc.from;
+        if (other <= n || graph_.nodes[index(other)].arcs.size() < 3) continue;
+        if (found_alone(n) || found_alone(other)) continue;
+        look({{n, a}, {other, a}}, thinnest(arc));
       }
     }
+    for (int n = 0; n < count; ++n)
+      if (found_[index(n)] == 0 && graph_.nodes[index(n)].arcs.size() == 3) look_for_end(n);
     return std::move(contacts_);
   }
 
@@ -188,6 +254,10 @@ class ContactFinder {
     for (const Voxel& v : arc.voxels) places.push_back(graph_.grid.offset(v));
     const std::vector<double> r = boundary_distances_mm(mask_, places);
     return *std::min_element(r.begin(), r.end());
+  }
+
+  bool found_alone(int n) const {
+    return found_[index(n)] != 0 && graph_.nodes[index(n)].arcs.size() > 3;
   }
 
   // Nodes, each with the arc that does not lead away from the contact.
@@ -205,110 +275,120 @@ class ContactFinder {
         if (exit) exits.push_back(*exit);
       }
     }
-    if (exits.size() != 4) return;
-    auto contact = contact_of(exits, bridge_mm, mask_);
-    if (contact) contacts_.push_back(std::move(*contact));
+    if (exits.size() < 4 || exits.size() > kMostExits) return;
+    auto contact = exits.size() == 4 ? contact_of(exits, bridge_mm, mask_)
+                                     : contact_among(exits, bridge_mm, mask_);
+    if (!contact) return;
+    contacts_.push_back(std::move(*contact));
+    for (const auto& node : nodes) found_[index(node.first)] = 1;
+  }
+
+  // A branch from its junction on: places of its axis and the distances to the wall there.
+  struct Branch {
+    std::vector<Vec3> points;
+    std::vector<double> radii;
+    double rest_mm = 0;  // of its length, beyond these points
+  };
+
+  Branch branch_from(int n, const VesselArc& arc) const {
+    Branch branch;
+    std::vector<std::size_t> places;
+    const std::size_t count = arc.voxels.size();
+    const double reach = kSearched * lumen_mm_[index(n)];
+    for (std::size_t i = 0; i < count; ++i) {
+      const Voxel& v = arc.voxels[arc.from == n ? i : count - 1 - i];
+      const Vec3 p = mask_.grid.world_mm(v);
+      if (!branch.points.empty() && (p - branch.points.front()).norm() > reach) {
+        branch.rest_mm = static_cast<double>(count - i) * mask_.grid.spacing_mm.minCoeff();
+        break;
+      }
+      branch.points.push_back(p);
+      places.push_back(mask_.grid.offset(v));
+    }
+    branch.radii = boundary_distances_mm(mask_, places);
+    return branch;
+  }
+
+  // Whether a vessel ends at the side of another in this junction of three.
+  void look_for_end(int n) {
+    const std::vector<int>& arcs = graph_.nodes[index(n)].arcs;
+    std::vector<std::optional<Exit>> exits;
+    for (const int a : arcs) {
+      const VesselArc& arc = graph_.arcs[index(a)];
+      if (arc.from == arc.to) return;
+      exits.push_back(exit_of(arc, arc.from == n, lumen_mm_[index(n)], mask_));
+      if (!exits.back()) return;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Exit &a = *exits[(k + 1) % 3], &b = *exits[(k + 2) % 3];
+      if (!goes_through(a, b)) continue;
+      VesselContact contact;
+      contact.kind = ContactKind::kEndToSide;
+      contact.a = vessel_through(a, b, 0.5 * voxel_mm(mask_.grid));
+      if (!end_of(branch_from(n, graph_.arcs[index(arcs[k])]), contact)) continue;
+      contacts_.push_back(std::move(contact));
+      return;
+    }
+  }
+
+  // Completes the contact if the branch comes out of a neck at the wall of the contact's vessel.
+  bool end_of(const Branch& branch, VesselContact& contact) const {
+    const double voxel = voxel_mm(mask_.grid), a = contact.a.radius_mm;
+    const auto from_axis = [&](const Vec3& p) {
+      return std::sqrt((contact.a.axis_mm.colwise() - p).colwise().squaredNorm().minCoeff());
+    };
+    std::size_t neck = 0;
+    for (std::size_t i = 1; i < branch.points.size(); ++i)
+      if (branch.radii[i] < branch.radii[neck] &&
+          from_axis(branch.points[i]) <= a + kTouchVoxels * voxel)
+        neck = i;
+    double length = branch.rest_mm, radius = 0;
+    for (std::size_t i = neck + 1; i < branch.points.size(); ++i) {
+      length += (branch.points[i] - branch.points[i - 1]).norm();
+      radius = std::max(radius, branch.radii[i]);
+    }
+    if (neck == 0 || branch.radii[neck] > radius - voxel || length < kGoesOn * radius ||
+        branch.radii[neck] >= kNeck * std::min(a, radius))
+      return false;
+    std::vector<Vec3> axis;
+    for (std::size_t i = neck; i < branch.points.size(); ++i) {
+      const double away = (branch.points[i] - branch.points[neck]).norm();
+      if (away >= kEndToAxis * radius && away <= kOnward * radius) axis.push_back(branch.points[i]);
+    }
+    if (axis.empty()) return false;
+    contact.b.radius_mm = radius;
+    contact.b.axis_mm.resize(3, std::ssize(axis));
+    for (Eigen::Index i = 0; i < contact.b.axis_mm.cols(); ++i)
+      contact.b.axis_mm.col(i) = axis[static_cast<std::size_t>(i)];
+    measure(contact);
+    contact.at_mm = branch.points[neck];
+    return true;
   }
 
   const VesselGraph& graph_;
   const Mask& mask_;
   std::vector<double> lumen_mm_;
+  std::vector<char> found_;  // nodes of a contact
   std::vector<VesselContact> contacts_;
-};
-
-struct Nearest {
-  double distance_mm;
-  Eigen::Index sample;
-};
-
-Nearest nearest(const Points3& axis, const Vec3& p) {
-  Eigen::Index at = 0;
-  const double squared = (axis.colwise() - p).colwise().squaredNorm().minCoeff(&at);
-  return {std::sqrt(squared), at};
-}
-
-// The voxels around a contact and whose they are.
-class Parting {
- public:
-  Parting(const Mask& mask, const VesselContact& contact) : mask_(mask), c_(contact) {
-    const double both = c_.a.radius_mm + c_.b.radius_mm;
-    const double voxel = voxel_mm(mask.grid);
-    zone_mm_ = std::max(both, c_.distance_mm) + 2.5 * voxel;
-    // Walls of vessels apart by more than the zone do not touch.
-    const Vec3 reach = Vec3::Constant(std::max(c_.a.radius_mm, c_.b.radius_mm) + 2 * voxel)
-                           .cwiseQuotient(mask.grid.spacing_mm);
-    for (std::size_t k = 0; k < 3; ++k) low_[k] = mask.grid.size[k], high_[k] = -1;
-    for (const Points3* axis : {&c_.a.axis_mm, &c_.b.axis_mm})
-      for (Eigen::Index i = 0; i < axis->cols(); ++i) {
-        const Vec3 at = mask.grid.index_vox(axis->col(i));
-        for (std::size_t k = 0; k < 3; ++k) {
-          const auto m = static_cast<Eigen::Index>(k);
-          low_[k] = std::min(low_[k], std::max(0, static_cast<int>(at[m] - reach[m])));
-          high_[k] = std::max(high_[k], std::min(mask.grid.size[k] - 1,
-                                                 static_cast<int>(std::ceil(at[m] + reach[m]))));
-        }
-      }
-    for (std::size_t k = 0; k < 3; ++k) owner_.grid.size[k] = high_[k] - low_[k] + 1;
-    owner_.voxels.assign(owner_.grid.voxel_count(), kNone);
-    assign();
-  }
-
-  // Offsets in the mask of the wider vessel's voxels that touch the other's.
-  std::vector<std::size_t> between() const {
-    const bool a_is_wider = c_.a.radius_mm >= c_.b.radius_mm;
-    const Owner loses = a_is_wider ? kA : kB, keeps = a_is_wider ? kB : kA;
-    std::vector<std::size_t> out;
-    for (std::size_t i = 0; i < owner_.voxels.size(); ++i) {
-      if (owner_.voxels[i] != loses) continue;
-      const Voxel v = owner_.grid.voxel(i);
-      bool touches = false;
-      for (int n = 0; n < 27 && !touches; ++n) {
-        const Voxel u{v[0] + n % 3 - 1, v[1] + n / 3 % 3 - 1, v[2] + n / 9 - 1};
-        touches = owner_.grid.contains(u) && owner_[u] == keeps;
-      }
-      if (touches) out.push_back(mask_.grid.offset(in_mask(v)));
-    }
-    return out;
-  }
-
- private:
-  enum Owner : std::uint8_t { kNone, kA, kB };
-
-  Voxel in_mask(const Voxel& v) const { return {v[0] + low_[0], v[1] + low_[1], v[2] + low_[2]}; }
-
-  void assign() {
-    for (std::size_t i = 0; i < owner_.voxels.size(); ++i) {
-      const Voxel v = in_mask(owner_.grid.voxel(i));
-      if (mask_[v] == 0) continue;
-      const Vec3 p = mask_.grid.world_mm(v);
-      const Nearest a = nearest(c_.a.axis_mm, p), b = nearest(c_.b.axis_mm, p);
-      if ((c_.a.axis_mm.col(a.sample) - c_.b.axis_mm.col(b.sample)).norm() > zone_mm_) continue;
-      owner_.voxels[i] = a.distance_mm * c_.b.radius_mm <= b.distance_mm * c_.a.radius_mm ? kA : kB;
-    }
-  }
-
-  const Mask& mask_;
-  const VesselContact& c_;
-  double zone_mm_ = 0;
-  Voxel low_{}, high_{};
-  Mask owner_;
 };
 
 }  // namespace
 
+std::string_view name_of(ContactKind kind) {
+  constexpr std::array<std::string_view, 3> kNames{"kissing", "bridge", "end_to_side"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::string_view words_for(ContactKind kind) {
+  constexpr std::array<std::string_view, 3> kWords{
+      "two vessels touch", "a bridge thinner than both its vessels",
+      "the end of a vessel touches the side of another, or a branch is narrow where it leaves"};
+  return kWords[static_cast<std::size_t>(kind)];
+}
+
 std::vector<VesselContact> find_contacts(const VesselGraph& graph, const Mask& mask) {
   EXPECTS(graph.grid.size == mask.grid.size);
   return ContactFinder(graph, mask).find();
-}
-
-Mask cut_contacts(Mask mask, const std::vector<VesselContact>& contacts) {
-  std::vector<std::size_t> cut;
-  for (const VesselContact& contact : contacts) {
-    const std::vector<std::size_t> between = Parting(mask, contact).between();
-    cut.insert(cut.end(), between.begin(), between.end());
-  }
-  for (const std::size_t o : cut) mask.voxels[o] = 0;
-  return mask;
 }
 
 }  // namespace angiospline

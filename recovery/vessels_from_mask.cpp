@@ -50,10 +50,8 @@ namespace {
 std::string contact_text(const VesselContact& contact) {
   return fmt::format(
       "{} at ({:.4g}, {:.4g}, {:.4g}) mm: radii {:.3g} and {:.3g} mm, axes {:.3g} mm apart",
-      contact.kind == ContactKind::kKissing ? "two vessels touch"
-                                            : "a bridge thinner than both its vessels",
-      contact.at_mm.x(), contact.at_mm.y(), contact.at_mm.z(), contact.a.radius_mm,
-      contact.b.radius_mm, contact.distance_mm);
+      words_for(contact.kind), contact.at_mm.x(), contact.at_mm.y(), contact.at_mm.z(),
+      contact.a.radius_mm, contact.b.radius_mm, contact.distance_mm);
 }
 
 // The pruned axis of the mask with its contacts cut; cutting may bring others to light.

@@ -88,6 +88,85 @@ TEST(Contacts, AreBridgesWhereSomethingThinLeadsAcrossAGap) {
   EXPECT_EQ(component_count(vessels_from_mask(mask, cutting()).value().tree), 2);
 }
 
+// One of two vessels that kiss forks where it does, away from the other; or both fork there.
+TEST(Contacts, WhereVesselsForkAreFoundAndCut) {
+  for (const bool both : {false, true})
+    for (const double radius : {5.0, 4.0}) {
+      Mask mask = crossing(5, radius, 80, 5 + radius - 0.7);
+      const double half = 0.5 * (5 + radius - 0.7);
+      add_tube(mask, Vec3(40, 40, 40 + half), Vec3(46, 40, 74), 3.5);
+      if (both) add_tube(mask, Vec3(40, 40, 40 - half), Vec3(40, 34, 6), 3.5);
+      const Vessels touching = vessels_from_mask(mask).value();
+      ASSERT_EQ(touching.contacts.size(), 1U) << both << radius;
+      EXPECT_EQ(touching.contacts[0].kind, ContactKind::kKissing);
+      EXPECT_LT((touching.contacts[0].at_mm - Vec3::Constant(40)).norm(), 3);
+      EXPECT_EQ(component_count(touching.tree), 1);
+      const Vessels apart = vessels_from_mask(mask, cutting()).value();
+      EXPECT_EQ(component_count(apart.tree), 2) << both << radius;
+      EXPECT_EQ(apart.tree.branches.size(), both ? 6U : 4U) << both << radius;
+    }
+}
+
+// A vessel along x, and one that comes at an angle and ends at its wall, `gap` beyond it: the rim
+// of its flat cap, or the nearest point of its round one.
+Mask end_at_side(double ra, double rb, double angle_deg, double gap, test::Ends ends) {
+  Mask mask = empty_mask({90, 80, 60});
+  add_tube(mask, Vec3(6, 30, 30), Vec3(84, 30, 30), ra);
+  const double angle = angle_deg * std::numbers::pi / 180;
+  const Vec3 way(std::cos(angle), std::sin(angle), 0);
+  const double cap = ends == test::Ends::kFlat ? rb * std::cos(angle) : rb;
+  const Vec3 end(36, 30 + ra + gap + cap, 30);
+  add_tube(mask, end, end + 36 * way, rb, ends);
+  return mask;
+}
+
+TEST(Contacts, OfAnEndWithASideAreFoundAndCut) {
+  for (const auto ends : {test::Ends::kFlat, test::Ends::kRound})
+    for (const double angle : {90.0, 70.0, 50.0})
+      for (const auto& [ra, rb] : {std::pair(5.0, 4.0), std::pair(4.0, 5.0)}) {
+        // A whole flat cap touches along the wall; deeper, no neck is left between the two.
+        const double gap = ends == test::Ends::kRound ? -0.7 : angle == 90 ? 0.3 : -0.3;
+        const Mask mask = end_at_side(ra, rb, angle, gap, ends);
+        const Vessels touching = vessels_from_mask(mask).value();
+        SCOPED_TRACE(testing::Message() << static_cast<int>(ends) << " " << angle << " " << ra);
+        EXPECT_EQ(component_count(touching.tree), 1);
+        ASSERT_EQ(touching.contacts.size(), 1U);
+        EXPECT_EQ(touching.contacts[0].kind, ContactKind::kEndToSide);
+        EXPECT_NEAR(touching.contacts[0].b.radius_mm, rb, 1);
+        const Vessels apart = vessels_from_mask(mask, cutting()).value();
+        EXPECT_EQ(component_count(apart.tree), 2) << angle << " " << ra;
+        EXPECT_EQ(apart.tree.branches.size(), 2U) << angle << " " << ra;
+      }
+}
+
+TEST(Contacts, AreNoneWhereABranchLeavesOrManyMeet) {
+  for (const double angle : {90.0, 60.0, 40.0})
+    for (const double rb : {2.0, 3.0, 5.0}) {
+      Mask mask = empty_mask({90, 80, 60});
+      add_tube(mask, Vec3(6, 30, 30), Vec3(84, 30, 30), 5);
+      const double a = angle * std::numbers::pi / 180;
+      add_tube(mask, Vec3(36, 30, 30), Vec3(36, 30, 30) + 38 * Vec3(std::cos(a), std::sin(a), 0),
+               rb);
+      const Vessels v = vessels_from_mask(mask).value();
+      EXPECT_TRUE(v.contacts.empty()) << angle << " " << rb;
+      EXPECT_EQ(v.tree.branches.size(), 3U);
+    }
+  std::size_t most = 0;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    Random random(40 + seed);
+    Mask mask = empty_mask({90, 90, 90});
+    const Vec3 centre = Vec3::Constant(45);
+    for (int k = 0; k < 6; ++k) {
+      const Vec3 way(random.gaussian(), random.gaussian(), random.gaussian());
+      add_tube(mask, centre, centre + 38 * way.normalized(), random.uniform(3, 5));
+    }
+    const Vessels v = vessels_from_mask(mask).value();
+    EXPECT_TRUE(v.contacts.empty()) << seed;
+    most = std::max(most, v.tree.branches.size());
+  }
+  EXPECT_GE(most, 6U);
+}
+
 TEST(Contacts, AreNoneInTreesAndWhereAxesCross) {
   std::size_t junctions = 0;
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
