@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <new>
+#include <optional>
 
 #include <fmt/format.h>
 // Debian's ITK knows the one compiler it was built with; clang passes for it in the features asked.
@@ -104,7 +106,37 @@ auto guarded(const std::filesystem::path& path, Format format, F&& body) -> decl
   }
 }
 
+// A DICOM file that is cut short would be read with whatever was in memory for the rest, and talk
+// on the error stream: where its voxels' element is (PS3.5, 7.1), one that fits must be among what
+// looks like it. Undefined length means compressed voxels, whose decoder finds the end missing.
+Result<void> is_whole_dicom(const std::filesystem::path& path) {
+  constexpr std::uintmax_t kSearched = std::uintmax_t{1} << 24;
+  const std::uintmax_t size = std::filesystem::file_size(path);
+  std::string bytes(static_cast<std::size_t>(std::min(size, kSearched)), '\0');
+  std::ifstream(path, std::ios::binary)
+      .read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (bytes.size() < 132 || bytes.compare(128, 4, "DICM") != 0) return {};
+  const std::string tag("\xe0\x7f\x10\x00", 4);  // little endian; the other order is retired
+  std::optional<std::uintmax_t> promised;
+  for (std::size_t at = bytes.find(tag); at != std::string::npos; at = bytes.find(tag, at + 1)) {
+    const bool explicit_type =
+        bytes.compare(at + 4, 2, "OW") == 0 || bytes.compare(at + 4, 2, "OB") == 0;
+    const std::size_t length_at = at + (explicit_type ? 8 : 4);
+    if (length_at + 4 > bytes.size()) continue;
+    std::uintmax_t length = 0;
+    for (std::size_t k = 4; k-- > 0;)
+      length = 256 * length + static_cast<unsigned char>(bytes[length_at + k]);
+    promised = length_at + 4 + length;
+    if (length == 0xffffffff || *promised <= size) return {};
+  }
+  if (!promised) return {};
+  return fail({ErrorKind::kBadInput, "file is cut short", path.string(),
+               fmt::format("{} bytes", size), fmt::format("its header promises {}", *promised)});
+}
+
 Result<itk::ImageIOBase::Pointer> open(const std::filesystem::path& path, Format format) {
+  if (format == Format::kDicom)
+    if (const auto whole = is_whole_dicom(path); !whole) return fail(whole.error());
   const itk::ImageIOBase::Pointer io = image_io(format);
   io->SetFileName(path.string());
   if (!io->CanReadFile(path.c_str()))
@@ -228,6 +260,8 @@ Result<std::vector<DicomSeries>> dicom_series(const std::filesystem::path& folde
     const auto io = itk::GDCMImageIO::New();
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
       const std::string name = entry.path().string();
+      if (entry.is_regular_file())
+        if (const auto whole = is_whole_dicom(entry.path()); !whole) return fail(whole.error());
       if (!entry.is_regular_file() || !io->CanReadFile(name.c_str())) continue;
       io->SetFileName(name);
       io->ReadImageInformation();

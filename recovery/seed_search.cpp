@@ -52,6 +52,7 @@ double extent_vox(const ImageGrid& grid, const std::vector<std::size_t>& voxels,
 
 struct Structure : TubularStructure {
   std::vector<std::size_t> voxels;
+  bool reaches_border = false;
 };
 
 // The structures of what answers, most in all first; faint ones left out.
@@ -83,6 +84,8 @@ std::vector<Structure> structures_of(const Vesselness& v, float strongest,
     std::size_t at_border = 0;
     for (const std::size_t i : s.voxels) {
       at_border += near_border(grid, grid.voxel(i), kBorder, kThinImage);
+      s.reaches_border =
+          s.reaches_border || near_border(grid, grid.voxel(i), kUnknownBorder + 1, 0);
       if (2 * static_cast<double>(v.answer.voxels[i]) >= s.strength)
         tubeness.push_back(static_cast<double>(v.tubeness.voxels[i]));
     }
@@ -124,7 +127,9 @@ struct Judgement {
                                  const SeedSearchOptions& options) {
     const auto fault = [&](const Structure& s) -> Reason* {
       if (s.border_share > kMostBorder) return &border;
-      return s.tubeness < kLeastTubeness || s.length_radii < kLeastLength ? &no_tube : nullptr;
+      // What the border cuts off may be longer.
+      const bool short_one = s.length_radii < kLeastLength && !s.reaches_border;
+      return s.tubeness < kLeastTubeness || short_one ? &no_tube : nullptr;
     };
     const auto weaker = [](const Structure& a, const Structure& b) {
       return a.strength < b.strength;

@@ -42,8 +42,9 @@ struct SeedSearch {
 //   along the border  more than half of its voxels lie within 4 voxels of a face of the image (of
 //                     an axis of more than 16 voxels): a fold of the image, a coil, a table. To
 //                     cross the border is no fault.
-//   no tube           its tubeness is below 0.4 (a sheet has 0, a ball 0.12, a tube 0.86), or it is
-//                     shorter than 4 radii of its core.
+//   no tube           its tubeness is below 0.4 (a sheet has 0, a ball 0.12, a tube 0.86), or it
+//   ends
+//                     within the image and is shorter than 4 radii of its core.
 //   weak              its core answers less than `least_strength` as strong as the strongest core.
 // Where the strongest structure is no tube or lies along the border it is taken away and the rest
 // is judged anew, so that one bright spot does not hide the vessels. Nothing kept: nothing tubular

@@ -294,7 +294,7 @@ Result<Segmented> segment(const AnyImage& image, const SegmentOptions& options,
     Result<SeedSearch> seeds = find_seeds(image, seed_options, progress);
     if (!seeds) return fail(seeds.error());
     if (seeds->kept.empty())
-      return fail({ErrorKind::kFailed,
+      return fail({ErrorKind::kBadInput,
                    "no vessel was found",
                    "segment",
                    {},

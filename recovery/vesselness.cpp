@@ -12,8 +12,9 @@
 namespace angiospline {
 namespace {
 
-// Second differences of an image smoothed for one scale, clamped at the border.
-Mat3 hessian_at(const Image<float>& f, const Voxel& v) {
+// Second differences of an image smoothed for one scale, clamped at the border; voxels are taken
+// for cubes.
+Mat3 differences_at(const Image<float>& f, const Voxel& v) {
   const auto at = [&](int dx, int dy, int dz) {
     const Voxel n{std::clamp(v[0] + dx, 0, f.grid.size[0] - 1),
                   std::clamp(v[1] + dy, 0, f.grid.size[1] - 1),
@@ -70,7 +71,7 @@ Result<Vesselness> vesselness(const Image<float>& image, const VesselnessOptions
       for (int y = 0; y < image.grid.size[1]; ++y)
         for (int x = 0; x < image.grid.size[0]; ++x) {
           const Voxel v{x, y, z};
-          const TubeAnswer here = tube_answer(normalise * hessian_at(f, v));
+          const TubeAnswer here = tube_answer(normalise * differences_at(f, v));
           if (!(static_cast<float>(here.answer) > best.answer[v])) continue;
           best.answer[v] = static_cast<float>(here.answer);
           best.tubeness[v] = static_cast<float>(here.tubeness);

@@ -12,8 +12,8 @@
 namespace angiospline {
 
 struct VesselnessOptions {
-  // Radii looked for, in voxels, at most 255 of them; the Gaussian of a scale has the deviation
-  // radius / sqrt(2), which answers strongest to a tube of that radius.
+  // Radii looked for, in smallest voxel edges, at most 255; the Gaussian of a scale has the
+  // deviation radius / sqrt(2), which answers strongest to a tube of that radius.
   std::vector<double> radii_vox = {1.5, 2.5, 4.0, 6.0};
   Polarity polarity = Polarity::kBright;
 };

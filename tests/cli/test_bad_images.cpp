@@ -131,6 +131,14 @@ TEST_F(Images, DicomFoldersThatAreNotOneSoundSeriesAreRefused) {
       folder_.write("mixed/" + std::string(series) + std::to_string(z) + ".dcm",
                     dicom_slice(z, series));
   expect_refusal_everywhere("mixed", {"mixed", "several DICOM series", "1.2.3.5 (3 slices)"});
+  // One slice without its last voxel.
+  fs::create_directories(folder_ / "cut");
+  for (const int z : {0, 1, 2}) {
+    const std::string slice = dicom_slice(z, "1.2.3.4");
+    folder_.write("cut/" + std::to_string(z) + ".dcm",
+                  z == 1 ? slice.substr(0, slice.size() - 2) : slice);
+  }
+  expect_refusal_everywhere("cut", {"1.dcm", "file is cut short"});
   // The way out that the message offers.
   expect_refusal({"segment", folder_ / "mixed", "--series", "1.2.3.5", "--seed-voxel", "90,1,1",
                   "-o", folder_ / "mask.nrrd"},
@@ -170,7 +178,7 @@ TEST_F(Images, VoxelsThatAreNotNumbersAreBackgroundAndCounted) {
                  {"none.mha", "mask is empty"});
   const ProgramRun nothing =
       run_angiospline({"segment", folder_ / "none.mha", "-o", folder_ / "none.nrrd"});
-  EXPECT_EQ(nothing.exit_code, 1);
+  EXPECT_EQ(nothing.exit_code, 2);
   EXPECT_TRUE(is_one_line(nothing.err)) << nothing.err;
   EXPECT_NE(nothing.err.find("no vessel was found"), std::string::npos) << nothing.err;
   EXPECT_FALSE(fs::exists(folder_ / "none.nrrd"));

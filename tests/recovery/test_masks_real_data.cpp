@@ -1,10 +1,14 @@
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 
 #include <gtest/gtest.h>
 
+#include "base/random.h"
 #include "io/image_file.h"
 #include "recovery/morphology.h"
+#include "recovery/segmentation.h"
 #include "recovery/vessels_from_mask.h"
 
 namespace angiospline {
@@ -65,6 +69,41 @@ INSTANTIATE_TEST_SUITE_P(
       const std::string name = p.param.file;
       return name.substr(0, name.find('.'));
     });
+
+// A head full of bright tissue: without seeds both carotids and the basilar artery, each a piece of
+// its own, and nothing else; whatever the pixel type and small noise.
+TEST(Segment_real_data, FindsTheThreeArteriesOfTheT1Series) {
+  const char* folder = std::getenv("ANGIOSPLINE_DATA");
+  if (!folder) GTEST_SKIP() << "ANGIOSPLINE_DATA is not set";
+  const auto file = read_image(std::filesystem::path(folder) / "volumes" / "dicom_t1gd");
+  ASSERT_TRUE(file.has_value()) << file.error().message();
+  Image<float> in_float(grid_of(file->image));
+  for (std::size_t i = 0; i < in_float.voxels.size(); ++i)
+    in_float.voxels[i] = static_cast<float>(value_at(file->image, in_float.grid.voxel(i)));
+  const auto whole = segment(file->image);
+  ASSERT_TRUE(whole.has_value()) << whole.error().message();
+  EXPECT_EQ(segment(in_float)->mask.voxels, whole->mask.voxels);
+  for (const double deviation : {0.0, 15.0, 30.0}) {
+    Random random(static_cast<std::uint64_t>(deviation) + 1);
+    Image<float> noisy = in_float;
+    for (float& v : noisy.voxels) v += static_cast<float>(deviation * random.gaussian());
+    const Mask mask = deviation == 0 ? whole->mask : segment(noisy)->mask;
+    const Components parts = connected_components(mask, Neighbours::kCorners26);
+    EXPECT_EQ(parts.list.size(), 3U) << deviation;
+    std::set<std::int32_t> found;
+    for (const Vec3& p :
+         {Vec3(29.4, -23.0, -57.5), Vec3(-27.2, -24.2, -53.0), Vec3(4.8, -15.6, -53.0)}) {
+      const Vec3 at = mask.grid.index_vox(p);
+      found.insert(
+          parts.labels[{static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])),
+                        static_cast<int>(std::lround(at[2]))}]);
+    }
+    EXPECT_EQ(found.size(), 3U) << deviation;
+    EXPECT_FALSE(found.contains(0)) << deviation;
+    EXPECT_GT(voxel_count(mask), 16000U) << deviation;
+    EXPECT_LT(voxel_count(mask), 19500U) << deviation;
+  }
+}
 
 }  // namespace
 }  // namespace angiospline
