@@ -62,6 +62,7 @@ struct JunctionOptions {
   double margin = 1.0;     // opening beyond the blend, in radii of the branch
   double blend = 0.15;     // width of the blend between branches, in radii of the thinner one
   double rounding = 0.09;  // radius of curvature at the crotch of an acute pair, in radii
+  int settings = 16;       // of the solve that are tried, at most
 };
 
 // How far from the centre each branch's opening comes to lie, in mm; the order

@@ -5,7 +5,9 @@
 
 #include <Eigen/Geometry>
 #include <fmt/core.h>
+#include <tbb/parallel_for.h>
 
+#include "base/contract.h"
 #include "modeling/junction.h"
 #include "modeling/junction_layout.h"
 #include "modeling/junction_quality.h"
@@ -49,6 +51,11 @@ constexpr std::array<Setting, 16> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60, 1},
 constexpr double kGentle = 8;
 constexpr double kGentleOfMany = 10;
 constexpr int kMoreTries = 4;  // for a fair surface that is sharper than its target
+// From so many branches on a setting takes half a second and more, mostly after all other junctions
+// of the tree: then two are tried at a time, and few more once one is fair.
+constexpr std::size_t kMany = 6;
+constexpr int kMoreTriesOfMany = 1;
+constexpr std::size_t kAtATime = 2;
 
 // What comes before the solve.
 struct Draft {
@@ -95,6 +102,40 @@ Attempt attempt(const Draft& draft, const Setting& setting, SmoothingWeights wei
   const JunctionQuality quality = junction_quality(draft.topology, draft.target, smooth.net);
   return {draft.topology, draft.layout.openings, std::move(smooth.net), quality};
 }
+
+// The attempts of all settings, in their order and made when they are asked for.
+class Attempts {
+ public:
+  Attempts(const OpeningPlan& plan, std::size_t at_a_time) : plan_(plan), at_a_time_(at_a_time) {}
+
+  Attempt take(std::size_t k) {
+    if (k == first_ + ready_.size()) make_next(k);
+    return std::move(*ready_[k - first_]);
+  }
+
+ private:
+  void make_next(std::size_t k) {
+    first_ = k;
+    ready_.clear();
+    ready_.resize(std::min(at_a_time_, kLadder.size() - k));
+    if (ready_.size() == 1) {
+      if (k == 0 || !draft_ || !share_draft(kLadder[k - 1], kLadder[k])) {
+        draft_ = make_draft(plan_, kLadder[k]);
+      }
+      ready_.front() = attempt(*draft_, kLadder[k]);
+      return;
+    }
+    tbb::parallel_for(std::size_t{0}, ready_.size(), [&](std::size_t i) {
+      ready_[i] = attempt(make_draft(plan_, kLadder[k + i]), kLadder[k + i]);
+    });
+  }
+
+  const OpeningPlan& plan_;
+  std::size_t at_a_time_;
+  std::size_t first_ = 0;
+  std::vector<std::optional<Attempt>> ready_;
+  std::optional<Draft> draft_;  // of the setting before
+};
 
 SurfaceNetwork make_network(const JunctionSpec& spec, const OpeningPlan& plan,
                             const JunctionTopology& topology, const JunctionNet& net) {
@@ -148,34 +189,34 @@ Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const At
 
 Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& options,
                                const Progress& progress) {
+  EXPECTS(options.settings > 0);
   const Result<OpeningPlan> plan = plan_openings(spec, options);
   if (!plan) return fail(plan.error());
   std::optional<Attempt> best;  // a fair one, otherwise a sound one, otherwise none
   std::string why;
+  const bool many = spec.branches.size() >= kMany;
   const double most_curvature = spec.branches.size() == 3 ? kGentle : kGentleOfMany;
-  int attempts = 0;
-  int more = kMoreTries;
-  std::optional<Draft> draft;
-  const Setting* before = nullptr;
-  for (const Setting& setting : kLadder) {
+  Attempts attempts(*plan, many ? kAtATime : 1);
+  int count = 0;
+  int more = many ? kMoreTriesOfMany : kMoreTries;
+  const auto settings = std::min(kLadder.size(), static_cast<std::size_t>(options.settings));
+  for (std::size_t k = 0; k < settings; ++k) {
     if (progress.should_stop()) return fail(cancelled("junction " + spec.name));
     if (best && is_fair(best->quality) && more-- == 0) break;
-    ++attempts;
-    if (before == nullptr || !share_draft(*before, setting)) draft = make_draft(*plan, setting);
-    before = &setting;
-    Attempt now = attempt(*draft, setting);
+    ++count;
+    Attempt now = attempts.take(k);
     if (why.empty()) why = failed_gate(now.quality);
     if (is_sound(now.quality) && (!best || is_better(now.quality, best->quality))) {
       best = std::move(now);
     }
     if (best && is_faithful(best->quality, most_curvature)) break;
   }
-  if (best) return make_result(spec, *plan, *best, attempts);
+  if (best) return make_result(spec, *plan, *best, count);
   std::string names;
   for (const JunctionBranch& b : spec.branches) names += (names.empty() ? "" : ", ") + b.name;
   return fail({ErrorKind::kFailed, "no setting gives a smooth junction",
                "junction " + spec.name + " of " + names, why,
-               fmt::format("{} settings tried", attempts)});
+               fmt::format("{} settings tried", count)});
 }
 
 Result<Junction> make_rough_junction(const JunctionSpec& spec, const JunctionOptions& options) {
