@@ -23,16 +23,19 @@ constexpr double kSlackRadius =
 constexpr double kFirstStep = 0.0125;
 constexpr int kRounds = 24;  // of stiffening bends that are too tight
 constexpr int kNarrowings = 4;
+// Of the path's even spans to either side of a bend: control points there hold all but a sixtieth
+// of the radius in it.
+constexpr double kNarrowedSpans = 1.6;
 constexpr double kNarrowerBend = 0.6;
 constexpr double kSpansPerRadius = 1.5;
 constexpr double kFinest = 0.33;      // of the mean radius
 constexpr double kNearEnd = 5.0;      // radii within which a bend is the end's
 constexpr double kLeadBend = 0.65;    // that a lead-in should keep, so that the fit to it has room
 constexpr double kNearTarget = 10.0;  // radii of way within which a point finds its place again
-constexpr double kThroat =
-    kMostNarrowed;                 // of the radius given up: the wall is likely to fold there
-constexpr double kFoldCost = 1e3;  // worse than any departure
+constexpr double kThroat = 0.4;       // of the radius given up: the wall is likely to fold there
+constexpr double kFoldCost = 1e3;     // worse than any departure
 constexpr double kLargestDeparture = 2.0;  // radii as bad as giving up kMostNarrowed of the radius
+constexpr double kGoodEnough = 0.5;        // of these two: no other way is looked for
 
 struct Rail {
   std::vector<double> parameters;  // of the target's columns, arc length over total length
@@ -300,20 +303,26 @@ class PathFit {
   BSplineCurve<4> course_;  // before any stiffening
 };
 
-// Lowers radius control points where the bend is too tight for the radius.
+// Lowers the radius where the bend is too tight for it, each control point near it by its own
+// share.
 BSplineCurve<4> narrow(const BSplineCurve<4>& curve, const std::vector<Bend>& bends,
                        double tightest) {
   Eigen::Matrix4Xd points = curve.control_points();
   const KnotVector& knots = curve.knots();
+  Eigen::VectorXd factors = Eigen::VectorXd::Ones(points.cols());
+  const std::vector<double> breaks = knots.breakpoints();
+  const double near = kNarrowedSpans * knots.last() / static_cast<double>(breaks.size() - 1);
   for (const Bend& bend : bends) {
     if (bend.curvature * bend.radius <= tightest) continue;
     const double factor = tightest / (bend.curvature * bend.radius);
     const int first = knots.span(bend.parameter) - knots.degree();
     // The ends' own radii are their neighbours' too.
     for (int i = std::max(first, 2); i <= first + knots.degree() && i < points.cols() - 2; ++i) {
-      points(3, i) = std::min(points(3, i), factor * bend.radius);
+      if (std::abs(knots.greville(i) - bend.parameter) > near) continue;
+      factors(i) = std::min(factors(i), factor);
     }
   }
+  points.row(3).array() *= factors.transpose().array();
   return BSplineCurve<4>(knots, std::move(points));
 }
 
@@ -382,7 +391,7 @@ BodyPath fit_body_path(const Eigen::Matrix4Xd& target, const PathEnd& start, con
     Attempt attempt = fit_within(rail, start, end, leave,
                                  freedom == PathFreedom::kNarrower ? kNarrowerBend : kTightestBend);
     if (!best || attempt.cost < best->cost) best = std::move(attempt);
-    if (best->cost <= 1) break;
+    if (best->cost <= kGoodEnough) break;
   }
   return std::move(best->path);
 }

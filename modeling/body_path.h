@@ -26,11 +26,11 @@ struct BodyPath {
 // keeps to 0.8, so that a smoothed path is followed as it is.
 inline constexpr double kTightestBend = 0.81;
 
-// Stiffening may move the path by so many radii. If that would narrow the radius by more than the
-// share below, or leave the target by more than two radii, other ways are tried (one radius, then
-// ends led in, then any move), and the one that gives up least of either is taken.
+// Stiffening may move the path by so many radii. If that would narrow the radius by more than half
+// of the share below, or leave the target by more than one radius, other ways are tried (one
+// radius, then ends led in, then any move), and the one that gives up least of either is taken.
 inline constexpr double kLargestPathMove = 0.3;
-inline constexpr double kMostNarrowed = 0.4;
+inline constexpr double kMostNarrowed = 0.1;
 
 // Follows `target` (columns x, y, z, radius in mm; at least two, not all in one place) between the
 // ends. What the target misses at the ends is made up by an elastic correction that dies out within

@@ -42,10 +42,10 @@ constexpr int kPatience = 3;         // rounds before a strength gives in to the
 constexpr double kLeastShare = 0.1;  // of its old way that a sample keeps to the one before it
 constexpr double kMostStiffness = 1e4;
 constexpr double kMostForce = 1e4;
-constexpr int kDenseSamples = 12;      // of the final path, for each span of the smoothing spline
-constexpr int kRefinements = 12;       // halvings of the final path's spans
-constexpr int kBendSamples = 8;        // of curvature, for each span
-constexpr double kLeastFactor = 0.35;  // radii are not reduced below this part of themselves
+constexpr int kDenseSamples = 12;     // of the final path, for each span of the smoothing spline
+constexpr int kRefinements = 12;      // halvings of the final path's spans
+constexpr int kBendSamples = 8;       // of curvature, for each span
+constexpr double kLeastFactor = 0.2;  // radii are not reduced below this part of themselves
 
 struct Samples {
   Eigen::MatrixXd points;  // one row a sample
