@@ -117,7 +117,12 @@ Json fidelity_json(const Fidelity& f) {
           {"mean_smoothing_move_radii", f.mean_move_radii},
           {"largest_smoothing_move_radii", f.largest_move_radii},
           {"largest_smoothing_move_mm", f.largest_move_mm},
-          {"largest_smoothing_move_branch", f.largest_move_branch}};
+          {"largest_smoothing_move_branch", f.largest_move_branch},
+          {"largest_clearance_move_radii", f.largest_clearance_move_radii},
+          {"largest_clearance_move_branch", f.largest_clearance_move_branch},
+          {"largest_total_move_radii", f.largest_total_move_radii},
+          {"largest_total_move_mm", f.largest_total_move_mm},
+          {"largest_total_move_branch", f.largest_total_move_branch}};
 }
 
 void print_json(const Json& json) { fmt::print("{}\n", json.dump(1, ' ')); }

@@ -152,25 +152,35 @@ class Gauge {
     }
   }
 
-  void measure_moves(const CenterlineBranch& branch, const BSplineCurve<4>& path) {
+  void measure_moves(const SmoothedTree& tree, std::size_t b) {
+    const CenterlineBranch& branch = tree.tree.branches[b];
     Eigen::Matrix4Xd points(4, branch.points_mm.cols());
-    points.topRows<3>() = branch.points_mm;
-    points.row(3) = branch.radii_mm.transpose();
-    const double total = length_mm(branch);
-    double along = 0;
-    const BSplineCurve<3> axis(path.knots(), path.control_points().topRows<3>());
-    for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      if (i > 0) along += (points.col(i) - points.col(i - 1)).head<3>().norm();
-      const double start = path.knots().last() * (total > 0 ? std::min(1.0, along / total) : 0.0);
-      const double move = nearest(axis, points.col(i).head<3>(), start);
-      const double radii = move / points(3, i);
-      moves_ += radii;
+    points << branch.points_mm, branch.radii_mm.transpose();
+    if (!tree.given.empty()) points = tree.given[b];
+    const BSplineCurve<4>& path = tree.paths[b];
+    const bool kept_apart = !tree.before_clearance.empty();
+    const BSplineCurve<4>& smoothed = kept_apart ? tree.before_clearance[b] : path;
+    const std::vector<double> moves = moves_from(points, smoothed);
+    const std::vector<double> total = kept_apart ? moves_from(points, path) : moves;
+    for (std::size_t i = 0; i < moves.size(); ++i) {
+      const double radius = points(3, static_cast<Eigen::Index>(i));
+      moves_ += moves[i] / radius;
       ++points_;
-      result_.largest_move_mm = std::max(result_.largest_move_mm, move);
-      if (radii > result_.largest_move_radii) {
-        result_.largest_move_radii = radii;
-        result_.largest_move_branch = branch.name;
-      }
+      result_.largest_move_mm = std::max(result_.largest_move_mm, moves[i]);
+      result_.largest_total_move_mm = std::max(result_.largest_total_move_mm, total[i]);
+      take_larger(moves[i] / radius, branch.name, result_.largest_move_radii,
+                  result_.largest_move_branch);
+      take_larger(total[i] / radius, branch.name, result_.largest_total_move_radii,
+                  result_.largest_total_move_branch);
+    }
+    if (!kept_apart) return;
+    constexpr int kPerControlPoint = 4;
+    const int count = kPerControlPoint * path.knots().control_point_count();
+    for (int k = 0; k <= count; ++k) {
+      const double t = path.knots().last() * k / count;
+      const Vec4 before = smoothed.at(t);
+      take_larger((path.at(t) - before).head<3>().norm() / before(3), branch.name,
+                  result_.largest_clearance_move_radii, result_.largest_clearance_move_branch);
     }
   }
 
@@ -201,6 +211,30 @@ class Gauge {
       along.push_back(t);
     }
     return along;
+  }
+
+  static void take_larger(double value, const std::string& branch, double& largest,
+                          std::string& of_branch) {
+    if (value <= largest) return;
+    largest = value;
+    of_branch = branch;
+  }
+
+  // The distance of each point (x, y, z, radius) from the path near its own share of the way.
+  static std::vector<double> moves_from(const Eigen::Matrix4Xd& points,
+                                        const BSplineCurve<4>& path) {
+    const BSplineCurve<3> axis(path.knots(), path.control_points().topRows<3>());
+    std::vector<double> along{0.0};
+    for (Eigen::Index i = 1; i < points.cols(); ++i) {
+      along.push_back(along.back() + (points.col(i) - points.col(i - 1)).head<3>().norm());
+    }
+    const double scale = along.back() > 0 ? path.knots().last() / along.back() : 0.0;
+    std::vector<double> moves;
+    for (Eigen::Index i = 0; i < points.cols(); ++i) {
+      const double start = std::min(path.knots().last(), scale * along[moves.size()]);
+      moves.push_back(nearest(axis, points.col(i).head<3>(), start));
+    }
+    return moves;
   }
 
   // The nearest of some local minima around the start.
@@ -250,7 +284,7 @@ Fidelity measure_fidelity(const SurfaceNetwork& network, const SmoothedTree& tre
   Gauge gauge;
   for (std::size_t b = 0; b < tree.paths.size(); ++b) {
     const CenterlineBranch& branch = tree.tree.branches[b];
-    gauge.measure_moves(branch, tree.paths[b]);
+    gauge.measure_moves(tree, b);
     const auto found = tubes.find("wall_" + branch.name);
     if (found == tubes.end()) continue;
     for (const Tube& tube : found->second) gauge.measure(tube, tree.paths[b], branch.name);
@@ -259,17 +293,24 @@ Fidelity measure_fidelity(const SurfaceNetwork& network, const SmoothedTree& tre
 }
 
 std::string to_text(const Fidelity& f) {
-  return fmt::format(
+  const auto name = [](const std::string& branch) { return branch.empty() ? "-" : branch; };
+  std::string text = fmt::format(
       "radius           {:.2g} % off the smoothed one in the mean, {:.2g} % at most away from "
       "junctions ({}); {} of {} sections are more than 5 % off\n"
       "centerline       moved by smoothing: {:.2g} radii in the mean, {:.2g} at most ({}; {:.3g} "
-      "mm); the model's axis is {:.2g} radii off it in the mean, {:.2g} at most ({})",
-      100 * f.mean_radius_error, 100 * f.largest_radius_error,
-      f.largest_error_branch.empty() ? "-" : f.largest_error_branch, f.far_off,
-      f.sections - f.near_junctions, f.mean_move_radii, f.largest_move_radii,
-      f.largest_move_branch.empty() ? "-" : f.largest_move_branch, f.largest_move_mm,
-      f.mean_axis_offset, f.largest_axis_offset,
-      f.largest_offset_branch.empty() ? "-" : f.largest_offset_branch);
+      "mm)",
+      100 * f.mean_radius_error, 100 * f.largest_radius_error, name(f.largest_error_branch),
+      f.far_off, f.sections - f.near_junctions, f.mean_move_radii, f.largest_move_radii,
+      name(f.largest_move_branch), f.largest_move_mm);
+  if (f.largest_clearance_move_radii > 0) {
+    text += fmt::format(
+        ", by the clearance: {:.2g} at most ({}), by both together: {:.2g} at most ({}; {:.3g} mm)",
+        f.largest_clearance_move_radii, f.largest_clearance_move_branch, f.largest_total_move_radii,
+        name(f.largest_total_move_branch), f.largest_total_move_mm);
+  }
+  return text +
+         fmt::format("; the model's axis is {:.2g} radii off it in the mean, {:.2g} at most ({})",
+                     f.mean_axis_offset, f.largest_axis_offset, name(f.largest_offset_branch));
 }
 
 }  // namespace angiospline

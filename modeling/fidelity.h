@@ -30,11 +30,19 @@ struct Fidelity {
   double largest_axis_offset = 0.0;
   std::string largest_offset_branch;
 
-  // The distance of the tree's points from their smoothed path.
+  // The distance of the input's points from their smoothed path, before vessels were kept apart.
   double largest_move_mm = 0.0;
   double largest_move_radii = 0.0;
   double mean_move_radii = 0.0;
   std::string largest_move_branch;
+
+  // How far keeping vessels apart moved the paths on from there, and the distance of the input's
+  // points from where they are then. The latter is the largest move where nothing was kept apart.
+  double largest_clearance_move_radii = 0.0;
+  std::string largest_clearance_move_branch;
+  double largest_total_move_mm = 0.0;
+  double largest_total_move_radii = 0.0;
+  std::string largest_total_move_branch;
 };
 
 // Bodies are the regions called "wall_<branch>". A branch that became part of a junction has none

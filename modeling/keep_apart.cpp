@@ -342,6 +342,7 @@ class Separator {
 SmoothedTree keep_apart(SmoothedTree tree, const KeepApartOptions& options) {
   EXPECTS(options.clearance >= 0 && options.largest_move >= 0);
   EXPECTS(options.thinnest > 0 && options.thinnest <= 1);
+  tree.before_clearance = tree.paths;
   Separator(tree, options).run();
   return tree;
 }

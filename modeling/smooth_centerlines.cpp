@@ -23,6 +23,8 @@ constexpr const char* kStage = "smooth centerlines";
 // not reach any wall.
 constexpr double kHidden = 1.0;
 
+constexpr double kInsideLimit = 0.99;  // of the largest move, for nodes: below it in any rounding
+
 constexpr std::size_t kNamedOverlaps = 50;  // pairs that are warned of by name
 constexpr double kWorthNaming = 0.95;       // of its radius that a branch keeps in its bends
 
@@ -74,7 +76,7 @@ void place_nodes(CenterlineTree& tree, const std::vector<std::optional<BranchSmo
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
     Vec3& position = tree.nodes[n].position_mm;
     const Vec3 move = places.row(static_cast<Eigen::Index>(n)).transpose() - position;
-    const double most = largest_move * radii[n].thinnest;
+    const double most = kInsideLimit * largest_move * radii[n].thinnest;
     if (!move.allFinite()) continue;
     position += move.norm() > most ? Vec3(most / move.norm() * move) : move;
   }
@@ -97,8 +99,14 @@ void warn_of_overlaps(SmoothedTree& tree) {
 Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const SmoothingOptions& options,
                                         const Progress& progress) {
   CleanedTree cleaned = clean_tree(tree);
-  SmoothedTree result{std::move(cleaned.tree), {}, 0.0, std::move(cleaned.warnings)};
+  SmoothedTree result;
+  result.tree = std::move(cleaned.tree);
+  result.warnings = std::move(cleaned.warnings);
   std::vector<CenterlineBranch>& branches = result.tree.branches;
+  for (const CenterlineBranch& branch : branches) {
+    result.given.emplace_back(4, branch.points_mm.cols());
+    result.given.back() << branch.points_mm, branch.radii_mm.transpose();
+  }
   if (branches.empty()) {
     const auto without_radius =
         std::find_if(tree.branches.begin(), tree.branches.end(), [](const CenterlineBranch& b) {

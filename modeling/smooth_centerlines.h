@@ -25,13 +25,19 @@ struct SmoothedTree {
 
   double largest_move_mm = 0.0;
   std::vector<std::string> warnings;
+
+  // What has become of the input's points can be told from these: the points of each branch (x, y,
+  // z, radius) before anything was moved; empty: as in `tree`. And the paths before vessels were
+  // kept apart (modeling/keep_apart.h); empty: none was asked to.
+  std::vector<Eigen::Matrix4Xd> given;
+  std::vector<BSplineCurve<4>> before_clearance;
 };
 
 // Cleans the tree (modeling/clean_tree.h) and smooths its branches (docs/centerlines.md): penalised
 // quintic splines through points and logarithms of radii, their strength chosen by restricted
 // likelihood, pooled over the tree; nodes placed by all their branches together. No given point
 // moves farther than `largest_move`; within that, bends are eased until curvature times radius is
-// below 0.8. Where that is not enough the radius gives way, down to half, and a warning names the
+// below 0.8. Where that is not enough the radius gives way, down to a fifth, and a warning names the
 // branch. Warnings also name what cleaning dropped and the vessels that overlap. A ring without
 // junctions ends at its node, where its tangent may turn. Errors: no branch of positive length is
 // left; stopped on request. O(points log points).

@@ -87,6 +87,21 @@ CenterlineTree crossing_tree(double distance) {
        branch_along("b", 0, 0, [&](double t) { return Vec4(20, 40 * t - 20, distance, 0.8); })});
 }
 
+TEST(Fidelity, StatesWhatTheClearanceMovedApartFromSmoothing) {
+  const SmoothedTree smooth = smooth_centerlines(crossing_tree(1.6)).value();
+  const SmoothedTree apart = keep_apart(smooth, {0.1, 0.5, 0.5});
+  const Fidelity f = measure_fidelity(seed_smoothed(apart)->network, apart);
+  EXPECT_LT(f.largest_move_radii, 0.01);  // straight lines: nothing to smooth
+  EXPECT_GT(f.largest_clearance_move_radii, 0.1);
+  EXPECT_LE(f.largest_clearance_move_radii, 0.5 + 1e-6);
+  EXPECT_NEAR(f.largest_total_move_radii, f.largest_clearance_move_radii, 0.02);
+  EXPECT_EQ(f.largest_total_move_branch, f.largest_clearance_move_branch);
+
+  const Fidelity before = measure_fidelity(seed_smoothed(smooth)->network, smooth);
+  EXPECT_EQ(before.largest_clearance_move_radii, 0);
+  EXPECT_EQ(before.largest_total_move_radii, before.largest_move_radii);
+}
+
 TEST(KeepApart, MovesVesselsThatTouchToTheClearanceAndLeavesOthersAlone) {
   const SmoothedTree before = smooth_centerlines(crossing_tree(1.6)).value();
   ASSERT_EQ(find_overlaps(before).size(), 1U);
