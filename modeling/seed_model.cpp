@@ -22,8 +22,10 @@ namespace {
 
 constexpr int kJunctionRounds = 6;  // of building, changing the plan of what failed, building again
 constexpr std::array<double, 3> kForwardRadii{1.0, 2.0, 4.0};  // of the first rounds, each on top
-constexpr double kReachFarther = 1.6;       // times the distance at which directions are taken
-constexpr double kMergeReach = 6.0;         // radii of branch between junctions that may be merged
+constexpr int kBendRounds = 4;         // of letting branches bend inside their junctions, at most
+constexpr int kFewSettings = 3;        // of a junction inside which branches bend
+constexpr double kReachFarther = 1.6;  // times the distance at which directions are taken
+constexpr double kMergeReach = 6.0;    // radii of branch between junctions that may be merged
 constexpr double kFarFromCenterline = 0.5;  // radii that are worth a warning
 constexpr int kMergePasses = 3;             // of merging junctions between which the body folds
 constexpr double kFoldedBody = 0.02;        // Jacobian ratio of a body that counts as folded
@@ -65,6 +67,21 @@ JunctionSpec centered(const PlannedNode& node) {
   return spec;
 }
 
+// A junction inside which branches bend: a few settings say whether it can be had.
+BuiltJunction build_bent_junction(const PlannedNode& node, JunctionOptions options,
+                                  const Progress& progress) {
+  BuiltJunction built{node.spec, {}, node.error};
+  if (node.error) return built;
+  options.settings = std::min(options.settings, kFewSettings);
+  Result<Junction> junction = make_junction(node.spec, options, progress);
+  if (!junction) {
+    built.error = junction.error();
+  } else if (junction->fair) {
+    built.junction = std::move(*junction);
+  }
+  return built;
+}
+
 // The junction with the options asked for; if that fails, with openings farther out. Branches that
 // do not meet in a point are first taken as if they did, with the openings where they are planned:
 // that is built sooner, and more often.
@@ -101,11 +118,25 @@ class Seeder {
       : tree_(tree), options_(options), progress_(progress), plan_(tree, options.junction) {}
 
   Result<Model> run() {
-    for (int pass = 0;; ++pass) {
+    const SeedPlan unbent = plan_;
+    excluded_.assign(plan_.nodes().size(), 0);
+    for (int round = 0; round < kBendRounds; ++round) {
+      bent_ = plan_.bend(excluded_);
+      if (bent_.empty() || build_bent()) break;
+      if (progress_.should_stop()) return fail(cancelled("junctions"));
+      plan_ = unbent;
+      bent_.clear();
+    }
+    for (int merges = 0;;) {
       if (!build_junctions()) return fail(cancelled("junctions"));
       number_junctions();
       if (!build_bodies()) return fail(cancelled("bodies"));
-      if (pass == kMergePasses || !merge_folded()) break;
+      if (unbend_folded()) {
+        plan_ = unbent;
+        bent_ = plan_.bend(excluded_);
+        continue;
+      }
+      if (merges++ == kMergePasses || !merge_folded()) break;
     }
     progress_.at("assemble", 0.0);
     if (pieces_.empty() && junctions_.empty()) {
@@ -130,6 +161,41 @@ class Seeder {
 
  private:
   // ---- junctions
+
+  // Where branches bend inside their junctions these are built; what fails is excluded. Whether
+  // nothing did.
+  bool build_bent() {
+    built_.resize(plan_.nodes().size());
+    std::vector<int> work;
+    for (const int n : bent_) {
+      if (!same(built_[index(n)].spec, plan_.nodes()[index(n)].spec)) work.push_back(n);
+    }
+    tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
+      built_[index(work[k])] =
+          build_bent_junction(plan_.nodes()[index(work[k])], options_.junction, progress_);
+    });
+    bool all = true;
+    for (const int n : bent_) {
+      if (built_[index(n)].junction) continue;
+      excluded_[index(n)] = 1;
+      all = false;
+    }
+    return all;
+  }
+
+  // Bodies that fold beside such a junction have lost their room to it.
+  bool unbend_folded() {
+    bool any = false;
+    for (const int b : folded_) {
+      const PlannedBranch& branch = plan_.branches()[index(b)];
+      for (const int n : {branch.from, branch.to}) {
+        if (std::find(bent_.begin(), bent_.end(), n) == bent_.end()) continue;
+        excluded_[index(n)] = 1;
+        any = true;
+      }
+    }
+    return any;
+  }
 
   bool build_junctions() {
     built_.resize(plan_.nodes().size());
@@ -542,6 +608,8 @@ class Seeder {
   const SeedOptions& options_;
   const Progress& progress_;
   SeedPlan plan_;
+  std::vector<char> excluded_;        // nodes inside which branches do not bend
+  std::vector<int> bent_;             // and those inside which they do
   std::vector<BuiltJunction> built_;  // one for each node of the plan
   std::vector<int> number_;           // of each node's junction, or -1
   std::vector<char> flow_;

@@ -387,6 +387,11 @@ SeedPlan::Room SeedPlan::room_of(int b) const {
   return room;
 }
 
+bool SeedPlan::has_room(int b) const {
+  const Room room = room_of(b);
+  return room.known && room.length >= room.least * (1 - kRounding);
+}
+
 // Where an opening is planned: at its wanted distance along its direction.
 double SeedPlan::planned_mm(BranchEnd end) const {
   return node_at(end).wanted_mm[index(slot_of(end))];

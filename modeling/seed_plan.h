@@ -58,12 +58,15 @@ struct PlannedNode {
   std::optional<Error> error;     // why no openings could be found
   double reach = 1.0;             // directions are taken at this multiple of the openings' distance
   std::vector<double> farther_mm;  // openings lie at least so far out
+  std::vector<double> bent_at;     // each branch's ray begins at this share of the way to its
+                                   // opening, on its path; 0: in the centre
   bool relieved = false;  // its centre and distances were chosen by what they ask of bodies
 
   // What was found for the branches that end here, when these are others.
   void forget_openings() {
     caps_mm.clear();
     farther_mm.clear();
+    bent_at.clear();
     relieved = false;
   }
   bool is_junction() const { return alive && ends.size() >= 3; }
@@ -90,8 +93,17 @@ class SeedPlan {
   bool merge_along(int branch);
   void settle();
 
+  // Where openings still strain the bodies behind them, branches are let bend inside their
+  // junctions: their rays begin on their paths. Returns these nodes; those excluded (one entry a
+  // node) stay as they are.
+  std::vector<int> bend(const std::vector<char>& excluded);
+
  private:
   struct Room;
+  // In seed_plan_bend.cpp.
+  struct Eased;
+  void ease(Eased& best) const;
+  std::optional<PlannedNode> eased(const PlannedNode& node) const;
   // In seed_plan_measure.cpp.
   void measure(PlannedNode& node) const;
   void aim(PlannedNode& node, const std::vector<double>& distance_mm) const;
@@ -102,6 +114,7 @@ class SeedPlan {
   void relieve(PlannedNode& node) const;
   std::vector<Vec3> other_centres(const PlannedNode& node) const;
   Room room_of(int branch) const;
+  bool has_room(int branch) const;
   double end_along(int branch, bool at_end, bool wanted) const;
   double planned_mm(BranchEnd end) const;
   double bend_of(int branch) const;

@@ -51,6 +51,11 @@ void SeedPlan::aim(PlannedNode& node, const std::vector<double>& distance) const
     Vec4 target = branch.at(end.at_end ? branch.length_mm() - s : s);
     const double radius = target(3);
     if (branch.straight) target.head<3>() = node_at({end.branch, !end.at_end}).center_mm;
+    if (node.bent_at[k] > 0 && !branch.straight) {
+      const double begins = node.bent_at[k] * s;
+      node.begins_mm[k] =
+          branch.at(end.at_end ? branch.length_mm() - begins : begins).head<3>() - node.center_mm;
+    }
     const Vec3 chord = target.head<3>() - node.center_mm - node.begins_mm[k];
     node.spec.branches[k] = {branch.name, chord.normalized(), radius, 0.0, node.begins_mm[k]};
   }
@@ -115,6 +120,7 @@ void SeedPlan::measure(PlannedNode& node) const {
   node.begins_mm.assign(n, Vec3::Zero());
   node.caps_mm.resize(n, std::numeric_limits<double>::infinity());
   node.farther_mm.resize(n, 0.0);
+  node.bent_at.resize(n, 0.0);
   node.error.reset();
   for (std::size_t k = 0; k < n; ++k) {
     const BranchEnd end = node.ends[k];

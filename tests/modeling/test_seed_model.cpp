@@ -10,11 +10,15 @@
 
 #include "base/random.h"
 #include "modeling/seed_model.h"
+#include "modeling/seed_plan.h"
+#include "modeling/smooth_centerlines.h"
 
 namespace angiospline {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 // Builds trees branch by branch.
 struct TreeMaker {
@@ -153,6 +157,63 @@ TEST(SeedModel, ABifurcationHasItsNamesAndIsSmoothEverywhere) {
   const double sum = kPi * (2.25 * 12 + 1.21 * std::sqrt(145) + 1.44 * std::sqrt(153));
   EXPECT_GT(volume, 0.85 * sum);
   EXPECT_LT(volume, 1.02 * sum);
+}
+
+// Two daughters that run side by side; then one turns back sharply.
+TreeMaker hooked_fork() {
+  const double shared = 2.2;
+  const double bend = 0.65;
+  const double turn = 2.1;  // radians
+  const double length = 16;
+  const auto hook = [=](double t) {
+    const double s = length * t;
+    const double angle = std::clamp((s - shared) / bend, 0.0, turn);
+    const double rest = std::max(0.0, s - shared - turn * bend);
+    return Vec3(std::min(s, shared) + bend * std::sin(angle) + rest * std::cos(turn),
+                -bend * (1 - std::cos(angle)) - rest * std::sin(turn), -0.1 * s);
+  };
+  TreeMaker maker;
+  const int a = maker.node({-12, 0, 0}, "a");
+  const int s = maker.node({0, 0, 0}, "s");
+  const int b = maker.node({14, 3.5, 2}, "b");
+  const int c = maker.node(hook(1), "c");
+  maker.line(a, s, 0.58);
+  maker.branch(s, b, 0.45, [](double t) { return Vec3(14 * t, 3.5 * t * t, 2 * t); });
+  maker.branch(s, c, 0.45, hook, 60);
+  maker.tree.inlets = {a};
+  return maker;
+}
+
+// Radians by which the branch turns away from its opening's axis, half a radius behind it.
+double turn_behind(const SeedPlan& plan, int node, std::size_t slot) {
+  const PlannedNode& n = plan.nodes()[index(node)];
+  const PlannedBranch& branch = plan.branches()[index(n.ends[slot].branch)];
+  const double distance = std::max(n.wanted_mm[slot], n.meets_mm[slot]);
+  const double along =
+      branch.along_at_distance(n.ends[slot], n.center_mm, distance).value_or(branch.length_mm());
+  const double step = n.spec.branches[slot].radius_mm / 2;
+  const double sign = n.ends[slot].at_end ? -1 : 1;
+  const double from = n.ends[slot].at_end ? branch.length_mm() - along : along;
+  const Vec3 way = (branch.at(from + sign * step) - branch.at(from)).head<3>();
+  return std::acos(std::clamp(way.normalized().dot(n.spec.branches[slot].direction), -1.0, 1.0));
+}
+
+TEST(SeedPlan, LetsABranchBendInsideItsJunctionWhereItWouldTurnBehindItsOpening) {
+  const SmoothedTree smooth = smooth_centerlines(hooked_fork().tree).value();
+  SeedPlan plan(smooth, {});
+  const auto worst = [&] {
+    double largest = 0;
+    for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, turn_behind(plan, 1, k));
+    return largest;
+  };
+  const double before = worst();
+  EXPECT_TRUE(SeedPlan(plan).bend({0, 1, 0, 0}).empty());  // excluded
+  ASSERT_EQ(plan.bend({0, 0, 0, 0}), std::vector<int>{1});
+  EXPECT_LT(worst(), before - 0.2);
+
+  const Model model = seed_smoothed(smooth).value();
+  EXPECT_TRUE(model.failed.empty());
+  expect_smooth(model.network);
 }
 
 TEST(SeedModel, WithoutInletsRimsAreCaps) {
