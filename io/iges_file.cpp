@@ -102,11 +102,14 @@ Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& pa
 Result<void> write_iges(const Solid& solid, const std::filesystem::path& path,
                         const IgesOptions& options, const Progress& progress) {
   return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(solid, temporary, options, progress); !done) return done;
+    if (auto done = write_unchecked(solid, temporary, options, progress); !done) {
+      if (done.error().kind == ErrorKind::kCancelled) return done;
+      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
+    }
     const Result<Solid> read = read_iges(temporary, progress);
     if (!read) {
       if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
-      return cannot_write(path, "cannot be read back: " + read.error().message());
+      return cannot_write(path, "cannot be read back: " + read.error().what);
     }
     return expect_same(solid, *read, path);
   });
