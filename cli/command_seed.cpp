@@ -60,9 +60,12 @@ int run_seed(const SeedArguments& arguments) {
                     ? std::filesystem::path(arguments.trees.front()).stem().string()
                     : arguments.name;
   watch.lap("model");
-  const Fidelity fidelity = measure_fidelity(model->network, *smoothed);
-  watch.lap("fidelity");
-  const auto finished = finish_model(*model, paths, arguments.step_schema, console, watch);
+  Fidelity fidelity;
+  const auto measure = [&] {
+    fidelity = measure_fidelity(model->network, *smoothed);
+    watch.lap("fidelity");
+  };
+  const auto finished = finish_model(*model, paths, arguments.step_schema, console, watch, measure);
   if (!finished) return report_error(finished.error());
   if (arguments.json) {
     Json json = model_json(*model);

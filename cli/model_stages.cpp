@@ -28,7 +28,7 @@ StepSchema step_schema(const std::string& name) {
 Result<Certificate> finish_model(const Model& model,
                                  const std::vector<std::filesystem::path>& paths,
                                  const std::string& schema, const Console& console,
-                                 Stopwatch& watch) {
+                                 Stopwatch& watch, const std::function<void()>& meanwhile) {
   ExportOptions options;
   options.step_in_side_process = true;
   options.step_schema = step_schema(schema);
@@ -39,6 +39,7 @@ Result<Certificate> finish_model(const Model& model,
     certificate =
         solid ? certify(*solid, {}, console.progress()) : Result<Certificate>(fail(solid.error()));
     watch.lap("check");
+    if (meanwhile) meanwhile();
   };
   const auto written = export_model(model, paths, options, console.progress(), check);
   watch.lap("wait for files");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,11 +20,12 @@ Result<CenterlineFileOptions> centerline_options(const CenterlineArguments& argu
 
 StepSchema step_schema(const std::string& name);
 
-// Writes the files and measures the model as a solid.
+// Writes the files and measures the model as a solid. `meanwhile` is called, once the other files
+// are written, while a STEP file may still be under way in a process of its own.
 Result<Certificate> finish_model(const Model& model,
                                  const std::vector<std::filesystem::path>& paths,
                                  const std::string& schema, const Console& console,
-                                 Stopwatch& watch);
+                                 Stopwatch& watch, const std::function<void()>& meanwhile = {});
 
 // Warnings, failed parts and one line of summary on stderr. Exit code 0 only if nothing failed and
 // the solid is closed, valid and free of self-intersection.
