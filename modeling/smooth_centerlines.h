@@ -37,7 +37,7 @@ struct SmoothedTree {
 // quintic splines through points and logarithms of radii, their strength chosen by restricted
 // likelihood, pooled over the tree; nodes placed by all their branches together. No given point
 // moves farther than `largest_move`; within that, bends are eased until curvature times radius is
-// below 0.8. Where that is not enough the radius gives way, down to a fifth, and a warning names the
+// below 0.8. Where that is not enough the radius gives way, down to a fifth; a warning names the
 // branch. Warnings also name what cleaning dropped and the vessels that overlap. A ring without
 // junctions ends at its node, where its tangent may turn. Errors: no branch of positive length is
 // left; stopped on request. O(points log points).
