@@ -97,11 +97,14 @@ std::optional<std::string> find_missing_table(const std::string& text) {
 Result<void> write_brep(const Solid& solid, const std::filesystem::path& path,
                         const Progress& progress) {
   return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(solid, temporary, progress); !done) return done;
+    if (auto done = write_unchecked(solid, temporary, progress); !done) {
+      if (done.error().kind == ErrorKind::kCancelled) return done;
+      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
+    }
     const Result<Solid> read = read_brep(temporary, progress);
     if (!read) {
       if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
-      return cannot_write(path, "cannot be read back: " + read.error().message());
+      return cannot_write(path, "cannot be read back: " + read.error().what);
     }
     return expect_same(solid, *read, path);
   });
