@@ -3,12 +3,14 @@
 //   bench_deformation bifurcation        388 nodes or nearly; preparation and iterations apart
 //   bench_deformation linear [most 1000000]
 // CPU seconds of one thread.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include <Eigen/SVD>
 #include <fmt/format.h>
@@ -83,9 +85,11 @@ void bifurcation() {
 
 // A tube of `count` nodes and a shell of edges about two voxels from it, one an element.
 void linear(double most) {
-  fmt::print(
-      "   nodes   prepare s   iteration ms   per node us (sparse) | RK1 iteration ms   per node "
-      "us\n");
+  fmt::print("{:>8} | {:^43} | {:^43}\n", "", "sparse", "runge-kutta-1");
+  fmt::print("{:>8}", "nodes");
+  for (int method = 0; method < 2; ++method)
+    fmt::print(" | {:>9} {:>11} {:>9} {:>11}", "set-up s", "first it. s", "it. ms", "us per node");
+  fmt::print("\n");
   for (double count = 1000; count <= most * 1.01; count *= 10) {
     const int columns = static_cast<int>(std::sqrt(count / 4)), rows = 4 * columns;
     const double radius = columns / (2 * std::numbers::pi);
@@ -117,15 +121,21 @@ void linear(double most) {
       DeformOptions options =
           method == DeformMethod::kSparse ? DeformOptions{} : thesis_options(method);
       options.rest_speed = 1e-12;
-      double one = 0, many = 0;
-      constexpr int kMore = 4;
-      options.most_iterations = 1;
-      if (!timed(one, [&] { return deform(mesh, edges, 1, options); })) return;
-      options.most_iterations = 1 + kMore;
-      if (!timed(many, [&] { return deform(mesh, edges, 1, options); })) return;
-      const double iteration = (many - one) / kMore;
-      if (method == DeformMethod::kSparse) fmt::print("   {:9.3f}", one - iteration);
-      fmt::print("   {:12.2f}   {:11.3f}  ", 1e3 * iteration, 1e6 * iteration / mesh.node_count());
+      options.most_iterations = 8;
+      // Whether to stop is asked before each iteration.
+      std::vector<double> starts;
+      Progress clock;
+      clock.stop_requested = [&] { return starts.push_back(cpu_seconds()), false; };
+      const double start = cpu_seconds();
+      if (!deform(mesh, edges, 1, options, clock)) return;
+      // The first iteration looks up every nearest node. Of the others the median.
+      std::vector<double> steps;
+      for (std::size_t k = 1; k + 1 < starts.size(); ++k)
+        steps.push_back(starts[k + 1] - starts[k]);
+      std::sort(steps.begin(), steps.end());
+      const double iteration = steps[steps.size() / 2];
+      fmt::print(" | {:9.3f} {:11.3f} {:9.2f} {:11.3f}", starts[0] - start, starts[1] - starts[0],
+                 1e3 * iteration, 1e6 * iteration / mesh.node_count());
     }
     fmt::print("\n");
     std::fflush(stdout);

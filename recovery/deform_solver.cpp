@@ -21,6 +21,13 @@ constexpr std::pair<DeformMethod, std::string_view> kMethods[] = {
     {DeformMethod::kRungeKutta1, "runge-kutta-1"},
     {DeformMethod::kRungeKutta4, "runge-kutta-4"}};
 
+// A factor fills in, and its making and its triangular solves grow faster than the mesh; conjugate
+// gradients on these well-conditioned matrices take some twenty products whatever its size. The
+// place of rest does not depend on their error, only the way there.
+constexpr int kMostFactorised = 10000;  // nodes
+constexpr double kMostCondition = 1e4;  // some 1,000 products
+constexpr double kGradientError = 1e-8;
+
 // Positions and velocities, in voxels and voxels per unit of time.
 struct State {
   Points3 nodes, velocity;
@@ -44,10 +51,6 @@ class Motion {
   Result<void> prepare() {
     const double dt = options_.time_step, mass = options_.elements.mass;
     const ElementOptions& e = options_.elements;
-    const Eigen::SparseMatrix<double>& L = system_.laplacian();
-    Eigen::SparseMatrix<double> identity(L.rows(), L.cols());
-    identity.setIdentity();
-    const Eigen::SparseMatrix<double> C = e.damping * L + e.drag * identity;
     std::optional<PeriodicGrid> grid;
     const bool circulant = options_.method == DeformMethod::kEulerDft ||
                            options_.method == DeformMethod::kEulerDftPhantom ||
@@ -59,14 +62,19 @@ class Motion {
     const double sides = mesh_.is_contour() ? 2 : 4;
     switch (options_.method) {
       case DeformMethod::kSparse: {
-        auto division =
-            divide_by_sparse(C + dt * (system_.stiffness() + potentials_.steepness() * identity));
+        const auto p = implicit_step(e, dt, potentials_.steepness());
+        const bool large = mesh_.node_count() > kMostFactorised;
+        if (large && system_.condition(p) <= kMostCondition) {
+          division_ = divide_by_gradients(system_.matrix(p), kGradientError);
+          break;
+        }
+        auto division = divide_by_sparse(system_.matrix(p));
         if (!division) return fail(division.error());
         division_ = std::move(*division);
         break;
       }
       case DeformMethod::kEulerSvd:
-        division_ = divide_by_svd(C);
+        division_ = divide_by_svd(system_.matrix({e.drag, e.damping, 0}));
         break;
       case DeformMethod::kEulerDft:
       case DeformMethod::kEulerDftPhantom:
@@ -76,7 +84,8 @@ class Motion {
                                             : CirculantNodes::kPhantom);
         break;
       case DeformMethod::kCentral:
-        division_ = divide_by_svd(mass / (dt * dt) * identity + 1 / (2 * dt) * C);
+        division_ = divide_by_svd(
+            system_.matrix({mass / (dt * dt) + e.drag / (2 * dt), e.damping / (2 * dt), 0}));
         break;
       case DeformMethod::kCentralDft:
         division_ =

@@ -1,13 +1,16 @@
 #include "recovery/deform_system.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>
 
+#include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SVD>
 #include <Eigen/SparseCholesky>
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <unsupported/Eigen/FFT>
 
 namespace angiospline {
@@ -38,6 +41,31 @@ class SparseDivision : public Division {
 
  private:
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors_;
+};
+
+class GradientDivision : public Division {
+ public:
+  GradientDivision(Eigen::SparseMatrix<double> A, double error) : A_(std::move(A)) {
+    A_.makeCompressed();
+    for (auto& solver : solvers_) {
+      solver.setTolerance(error);
+      solver.compute(A_);
+    }
+  }
+  Points3 operator()(const Points3& b) const override {
+    Eigen::MatrixX3d x(b.cols(), 3);
+    tbb::parallel_for(0, 3, [&](int k) {
+      const Eigen::VectorXd side = b.row(k).transpose();
+      x.col(k) = solvers_[static_cast<std::size_t>(k)].solve(side);
+    });
+    return x.transpose();
+  }
+
+ private:
+  Eigen::SparseMatrix<double> A_;
+  // One a coordinate: each keeps count of its own steps. All refer to A_.
+  std::array<Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper>, 3>
+      solvers_;
 };
 
 class CirculantDivision : public Division {
@@ -111,10 +139,21 @@ Result<void> ElementOptions::check() const {
   return {};
 }
 
+LaplacianPolynomial stiffness(const ElementOptions& e) {
+  return {0.0, e.spring + e.membrane, e.bending};
+}
+
+LaplacianPolynomial implicit_step(const ElementOptions& e, double dt, double steepness) {
+  const LaplacianPolynomial K = stiffness(e);
+  return {e.drag + dt * (K.constant + steepness), e.damping + dt * K.linear, dt * K.square};
+}
+
 ElementSystem::ElementSystem(const DeformMesh& mesh, double voxel_mm, const ElementOptions& options)
     : springs_(mesh.springs), options_(options), rest_(mesh.nodes_mm / voxel_mm) {
   rest_length_.resize(springs_.cols());
   std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(static_cast<std::size_t>(4 * springs_.cols() + rest_.cols()));
+  for (int k = 0; k < rest_.cols(); ++k) entries.emplace_back(k, k, 0.0);
   for (Eigen::Index s = 0; s < springs_.cols(); ++s) {
     const int a = springs_(0, s), b = springs_(1, s);
     rest_length_[s] = (rest_.col(b) - rest_.col(a)).norm();
@@ -144,7 +183,8 @@ Points3 ElementSystem::internal(const Points3& nodes, SystemForm form) const {
     return length > 0 ? options_.spring * (1 - rest_length_[s] / length) : 0.0;
   };
   if (form == SystemForm::kAssembled) {
-    Eigen::SparseMatrix<double> K = stiffness() - options_.spring * laplacian_;
+    const LaplacianPolynomial bent{0, options_.membrane, options_.bending};
+    const Eigen::SparseMatrix<double> K = matrix(bent);
     std::vector<Eigen::Triplet<double>> entries;
     for (Eigen::Index s = 0; s < springs_.cols(); ++s) {
       const int a = springs_(0, s), b = springs_(1, s);
@@ -180,13 +220,20 @@ Points3 ElementSystem::damping(const Points3& velocity, SystemForm form) const {
   return options_.damping * sum_over_springs(velocity) - options_.drag * velocity;
 }
 
-Eigen::SparseMatrix<double> ElementSystem::stiffness() const {
-  Eigen::SparseMatrix<double> K = (options_.spring + options_.membrane) * laplacian_;
-  if (options_.bending > 0) {
-    const Eigen::SparseMatrix<double> squared = laplacian_ * laplacian_;
-    K += options_.bending * squared;
+Eigen::SparseMatrix<double> ElementSystem::matrix(const LaplacianPolynomial& p) const {
+  Eigen::SparseMatrix<double> A = p.linear * laplacian_;
+  if (p.square > 0) {
+    Eigen::SparseMatrix<double> squared = laplacian_ * laplacian_;
+    A += p.square * squared;
   }
-  return K;
+  A.diagonal().array() += p.constant;
+  return A;
+}
+
+double ElementSystem::condition(const LaplacianPolynomial& p) const {
+  // No eigenvalue of L is above twice the most neighbours, by its circles of Gershgorin.
+  const double most = 2 * laplacian_.diagonal().maxCoeff();
+  return 1 + (p.linear + p.square * most) * most / p.constant;
 }
 
 std::unique_ptr<Division> divide_by_svd(const Eigen::SparseMatrix<double>& A) {
@@ -214,6 +261,11 @@ Result<std::unique_ptr<Division>> divide_by_sparse(const Eigen::SparseMatrix<dou
                  {},
                  "needs damping against the ground or stiff potentials"});
   return division;
+}
+
+std::unique_ptr<Division> divide_by_gradients(Eigen::SparseMatrix<double> A, double error) {
+  EXPECTS(error > 0);
+  return std::make_unique<GradientDivision>(std::move(A), error);
 }
 
 }  // namespace angiospline

@@ -23,6 +23,18 @@ struct ElementOptions {
   Result<void> check() const;
 };
 
+// constant I + linear L + square L^2 of the graph Laplacian L, each at least 0.
+struct LaplacianPolynomial {
+  double constant = 0.0;
+  double linear = 0.0;
+  double square = 0.0;
+};
+// membrane L + bending L^2, and the springs as if they were membranes.
+LaplacianPolynomial stiffness(const ElementOptions& e);
+// C + dt (K + steepness I): what a massless implicit step of dt divides by, where the potentials
+// change by `steepness` with a node's place.
+LaplacianPolynomial implicit_step(const ElementOptions& e, double dt, double steepness);
+
 enum class SystemForm {
   kElements,   // element by element (5.18): nothing is assembled
   kAssembled,  // sparse global matrices (5.2), the springs' anew in every step
@@ -43,8 +55,9 @@ class ElementSystem {
   // The graph Laplacian: number of neighbours on the diagonal, -1 for each neighbour. The damping
   // matrix of every coordinate is damping * L + drag * I, (5.24).
   const Eigen::SparseMatrix<double>& laplacian() const { return laplacian_; }
-  // membrane * L + bending * L^2, and the springs as if they were membranes.
-  Eigen::SparseMatrix<double> stiffness() const;
+  Eigen::SparseMatrix<double> matrix(const LaplacianPolynomial& p) const;
+  // Largest over least eigenvalue of matrix(p) at most; infinite where p.constant is 0.
+  double condition(const LaplacianPolynomial& p) const;
 
  private:
   Points3 sum_over_springs(const Points3& field) const;  // -L field, element by element
@@ -81,5 +94,10 @@ std::unique_ptr<Division> divide_by_circulant(const PeriodicGrid& grid, double c
 
 // A sparse factorisation L D L^T, made once. Error: A is not positive definite.
 Result<std::unique_ptr<Division>> divide_by_sparse(const Eigen::SparseMatrix<double>& A);
+
+// Conjugate gradients with the diagonal as preconditioner, until |b - A x| <= error |b| for each
+// coordinate. Nothing is factorised: O(nonzeros sqrt(condition) log(1 / error)). Requires a
+// positive definite A.
+std::unique_ptr<Division> divide_by_gradients(Eigen::SparseMatrix<double> A, double error);
 
 }  // namespace angiospline

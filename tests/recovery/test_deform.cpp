@@ -2,6 +2,7 @@
 #include <limits>
 #include <numbers>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -232,6 +233,34 @@ TEST(Divisions, AgreeWhereTheyMust) {
   EXPECT_FALSE(divide_by_sparse(system.laplacian() - identity));
 }
 
+TEST(Divisions, ConjugateGradientsDivideAsTheFactorDoes) {
+  Random random(8);
+  const DeformMesh mesh = tube(40, 25, 10, 2.5);
+  const ElementOptions e{0.4, 0.3, 0.2, 1.0, 0.5, 1.0};
+  const ElementSystem system(mesh, 1, e);
+  const LaplacianPolynomial p = implicit_step(e, 0.7, 3);
+  const Eigen::SparseMatrix<double> A = system.matrix(p);
+  const Points3 b = random_points(random, mesh.node_count(), 2);
+  const Points3 x = (*divide_by_gradients(A, 1e-8))(b);
+  EXPECT_LT((x * A - b).norm(), 2e-8 * b.norm());
+  EXPECT_LT((x - (**divide_by_sparse(A))(b)).norm(), 1e-7 * x.norm());
+  // The matrix is C + dt (K + s I) as its parts have it.
+  const Points3 moved = system.rest() + b;
+  ElementOptions soft = e;  // springs as membranes, whose forces are linear
+  soft.spring = 0;
+  soft.membrane = e.spring + e.membrane;
+  const Points3 force = -ElementSystem(mesh, 1, soft).internal(moved, SystemForm::kElements);
+  const Points3 drag = -system.damping(b, SystemForm::kElements);
+  EXPECT_LT((b * A - (drag + 0.7 * (force + 3 * b))).norm(), 1e-12 * (b * A).norm());
+  // Its condition is bounded, and the bound is of the right size.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(A),
+                                                             Eigen::EigenvaluesOnly);
+  const double condition = eigen.eigenvalues().maxCoeff() / eigen.eigenvalues().minCoeff();
+  EXPECT_GE(system.condition(p), condition);
+  EXPECT_LT(system.condition(p), 1.2 * condition);
+  EXPECT_TRUE(std::isinf(system.condition(stiffness(e))));
+}
+
 TEST(Divisions, OnlyPhantomNodesLetATubeMoveAsAWhole) {
   const DeformMesh mesh = tube(15, 12, 10, 4);
   const ElementSystem system(mesh, 1, {});
@@ -344,6 +373,24 @@ TEST(Deform, FindsACircleFromBesideIt) {
   for (int k = 0; k < 24; ++k)
     EXPECT_NEAR((fit->mesh.nodes_mm.col(k) - Vec3(2, 1, 0)).norm(), 6, 0.15);
   EXPECT_LT(fit->report.residual_force.maxCoeff(), 5);
+}
+
+TEST(Deform, LargeMeshesComeToRestWithoutAFactor) {
+  // 10,800 nodes, so conjugate gradients; half a voxel from their edges.
+  const int rows = 90, columns = 120;
+  const double radius = columns / (2 * kPi);
+  const DeformMesh start = tube(rows, columns, radius, 1);
+  const EdgePoints edges = ring_of_edges(Vec3::Zero(), radius + 0.5, columns, 1, rows);
+  const auto fit = deform(start, edges, 1);
+  ASSERT_TRUE(fit) << fit.error().message();
+  EXPECT_EQ(fit->report.termination, Termination::kAtRest);
+  double worst = 0;
+  for (int k = 0; k < start.node_count(); ++k)
+    worst = std::max(worst, std::abs(fit->mesh.nodes_mm.col(k).head<2>().norm() - radius - 0.5));
+  EXPECT_LT(worst, 0.1);
+  EXPECT_GT(worst, 0);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(fit->mesh.nodes_mm, deform(start, edges, 1)->mesh.nodes_mm);
 }
 
 TEST(Deform, ThesisPseudoInverseCannotTranslate) {
