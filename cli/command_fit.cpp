@@ -26,8 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<MaskComparison> compare_with_truth(const Model& model, const ImageGrid& grid,
-                                          const std::string& path, const Progress& progress) {
+// The mask to measure by: on the image's own grid, which is checked before anything long begins.
+Result<Mask> read_truth(const std::string& path, const ImageGrid& grid, const Progress& progress) {
   const auto file = read_image(path, {}, progress);
   if (!file) return fail(file.error());
   const ImageGrid& own = grid_of(file->image);
@@ -37,11 +37,27 @@ Result<MaskComparison> compare_with_truth(const Model& model, const ImageGrid& g
                              own.size[2], grid.size[0], grid.size[1], grid.size[2]),
                  "both lie on one grid"});
   }
-  const auto truth = mask_from_image(file->image, path);
-  if (!truth) return fail(truth.error());
+  constexpr double kOff = 0.01;  // voxels between far corners
+  const Vec3 corner(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1);
+  for (const Vec3& at : {Vec3(0, 0, 0), corner}) {
+    const Vec3 mm = own.world_mm(at);
+    if ((grid.index_vox(mm) - at).norm() <= kOff) continue;
+    const Vec3 image_mm = grid.world_mm(at);
+    return fail({ErrorKind::kBadInput, "the truth does not lie where the image does", path,
+                 fmt::format("voxel ({}, {}, {}) is at ({:.5g}, {:.5g}, {:.5g}) mm, the image's at "
+                             "({:.5g}, {:.5g}, {:.5g})",
+                             at(0), at(1), at(2), mm(0), mm(1), mm(2), image_mm(0), image_mm(1),
+                             image_mm(2)),
+                 "both lie on one grid"});
+  }
+  return mask_from_image(file->image, path);
+}
+
+Result<MaskComparison> compare_with_truth(const Model& model, const Mask& truth,
+                                          const Progress& progress) {
   const auto mesh = tessellate(model.network, {}, progress);
   if (!mesh) return fail(mesh.error());
-  return compare_masks(*truth, voxelized(mesh->mesh, truth->grid));
+  return compare_masks(truth, voxelized(mesh->mesh, truth.grid));
 }
 
 Result<void> write_residual(const std::string& path, const std::string& name,
@@ -58,8 +74,10 @@ struct Fitted {
   bool converged = false;
   int iterations = 0;
   const char* force_unit = "mm";
-  Json details;                          // of the way it was fitted
-  std::string summary;                   // for people
+  Json details;                // of the way it was fitted
+  std::string summary;         // for people
+  TriangleMesh residual_mesh;  // what is left of the distance, or of the force, on it
+  MeshField residual;
   std::vector<std::string> unconverged;  // parts that were held or have no wall near them
 
   bool converged_part(const std::string& name) const {
@@ -99,13 +117,10 @@ Result<Fitted> fit_walls(const Model& model, const Image<float>& image,
   if (!fitted) return fail(fitted.error());
   const auto before = tessellate(model.network, {}, progress);
   if (!before) return fail(before.error());
-  const auto mesh = tessellate(fitted->model.network, {}, progress);
+  auto mesh = tessellate(fitted->model.network, {}, progress);
   if (!mesh) return fail(mesh.error());
-  const MeshField residual = wall_residual(fitted->model, *mesh, image, options);
-  if (auto written = write_residual(arguments.residual, fitted->model.name, mesh->mesh, residual);
-      !written) {
-    return fail(written.error());
-  }
+  MeshField residual = wall_residual(fitted->model, *mesh, image, options, progress);
+  if (progress.should_stop()) return fail(cancelled("wall"));
   const FitReport& report = fitted->report;
   Fitted result;
   result.parts = part_figures(mesh->mesh, residual, before->mesh);
@@ -122,6 +137,8 @@ Result<Fitted> fit_walls(const Model& model, const Image<float>& image,
       "({} before data reduction)",
       report.snr, report.mean_axis_move_mm, report.mean_move_mm, left, report.control_points,
       report.control_points_before_reduction);
+  result.residual_mesh = std::move(mesh->mesh);
+  result.residual = std::move(residual);
   result.model = std::move(fitted->model);
   return result;
 }
@@ -141,11 +158,6 @@ Result<Fitted> fit_by_edges(const Model& model, const Image<float>& image,
   options.dark = arguments.dark;
   auto deformed = deform_model(model, image, options, progress);
   if (!deformed) return fail(deformed.error());
-  if (auto written =
-          write_residual(arguments.residual, model.name, deformed->mesh, deformed->residual_force);
-      !written) {
-    return fail(written.error());
-  }
   Fitted result;
   result.parts = deformed->parts;
   result.converged = deformed->report.termination == Termination::kAtRest;
@@ -165,6 +177,8 @@ Result<Fitted> fit_by_edges(const Model& model, const Image<float>& image,
       fmt::format("{}: {} after {} iterations; {} nodes among {} edges, moved {:.3g} mm",
                   arguments.solver, to_string(deformed->report.termination), result.iterations,
                   deformed->nodes, deformed->edges, result.parts.back().moved_mean_mm);
+  result.residual_mesh = std::move(deformed->mesh);
+  result.residual = std::move(deformed->residual_force);
   result.model = std::move(deformed->model);
   return result;
 }
@@ -231,6 +245,12 @@ int run_fit(const FitArguments& arguments) {
   if (!file) return report_error(file.error());
   const auto image = grey_image(file->image, arguments.image);
   if (!image) return report_error(image.error());
+  std::optional<Mask> truth_mask;
+  if (!arguments.truth.empty()) {
+    auto truth = read_truth(arguments.truth, image->grid, console.progress());
+    if (!truth) return report_error(truth.error());
+    truth_mask = *std::move(truth);
+  }
   watch.lap("read");
 
   const auto fitted = arguments.solver.empty()
@@ -243,9 +263,8 @@ int run_fit(const FitArguments& arguments) {
   }
   watch.lap("fit");
   std::optional<MaskComparison> truth;
-  if (!arguments.truth.empty()) {
-    auto compared =
-        compare_with_truth(fitted->model, image->grid, arguments.truth, console.progress());
+  if (truth_mask) {
+    const auto compared = compare_with_truth(fitted->model, *truth_mask, console.progress());
     if (!compared) return report_error(compared.error());
     truth = *compared;
     watch.lap("truth");
@@ -253,6 +272,11 @@ int run_fit(const FitArguments& arguments) {
   const auto certificate =
       finish_model(fitted->model, paths, arguments.step_schema, console, watch);
   if (!certificate) return report_error(certificate.error());
+  if (const auto written = write_residual(arguments.residual, fitted->model.name,
+                                          fitted->residual_mesh, fitted->residual);
+      !written) {
+    return report_error(written.error());
+  }
 
   console.say(fitted->summary);
   if (truth) {

@@ -223,7 +223,8 @@ namespace {
 // The factor with the least expected squared error: from the rule's own, up or down while it falls.
 void choose_wave(MeshSmoother& smoother, const Eigen::VectorXd& wanted,
                  const Eigen::VectorXd& weights, const Eigen::VectorXd& waves, double density,
-                 const std::vector<double>& factors, Displacement& result) {
+                 const std::vector<double>& factors, const Progress& progress,
+                 Displacement& result) {
   const Eigen::VectorXd mass = weights.cwiseProduct(smoother.mass_mm2());
   std::vector<std::optional<std::pair<double, double>>> known(factors.size());
   const auto expected = [&](int k) {
@@ -236,11 +237,15 @@ void choose_wave(MeshSmoother& smoother, const Eigen::VectorXd& wanted,
     return value->first;
   };
   const int last = static_cast<int>(factors.size()) - 1;
+  // Each factor costs a factorisation of the whole wall: between them the caller may stop.
+  const auto better = [&](int other, int than) {
+    return !progress.should_stop() && expected(other) < expected(than);
+  };
   int k = last / 2;
-  if (k < last && expected(k + 1) < expected(k)) {
-    while (k < last && expected(k + 1) < expected(k)) ++k;
+  if (k < last && better(k + 1, k)) {
+    while (k < last && better(k + 1, k)) ++k;
   } else {
-    while (k > 0 && expected(k - 1) < expected(k)) --k;
+    while (k > 0 && better(k - 1, k)) --k;
   }
   expected(k);
   result.wave_factor = factors[at(k)];
@@ -278,8 +283,9 @@ Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, Mesh
     const Offsets offsets = measure_offsets(field, mesh, result.greys, result.normal_mm, half);
     const Eigen::VectorXd wanted = result.normal_mm + offsets.mm;
     Eigen::VectorXd weights = offsets.weight;
+    if (progress.should_stop()) return result;
     Eigen::VectorXd smooth = smoother.fair(wanted, weights, result.wave_factor * waves);
-    if (last) {
+    if (last && !progress.should_stop()) {
       weigh_outliers(wanted - smooth, offsets.weight, 0.1 * field.voxel_mm(), weights);
       const double relative = 1 / result.greys.snr();
       // Nodes farther apart than voxels see only part of the image.
@@ -287,7 +293,8 @@ Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, Mesh
           std::max(field.voxel_mm() * field.voxel_mm(), kNodeNoise * smoother.mass_mm2().mean());
       const double density =
           relative * relative * 2 * half * area * field.voxel_mm() * field.voxel_mm();
-      choose_wave(smoother, wanted, weights, waves, density, options.wave_factors, result);
+      choose_wave(smoother, wanted, weights, waves, density, options.wave_factors, progress,
+                  result);
       smooth = smoother.fair(wanted, weights, result.wave_factor * waves);
     }
     result.normal_mm = smooth.cwiseMin(farthest).cwiseMax(-farthest);

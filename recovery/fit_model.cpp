@@ -260,7 +260,8 @@ Result<FittedModel> fit_model(const Model& model, const Image<float>& image,
 }
 
 MeshField wall_residual(const Model& model, const Tessellation& tessellation,
-                        const Image<float>& image, const FitOptions& options) {
+                        const Image<float>& image, const FitOptions& options,
+                        const Progress& progress) {
   const Image<float> brightened = options.dark ? negated(image) : Image<float>();
   const GreyField field(options.dark ? brightened : image);
   FitMeshOptions spacing;
@@ -270,10 +271,11 @@ MeshField wall_residual(const Model& model, const Tessellation& tessellation,
   DisplacementOptions one_round = options.displacement;
   one_round.half_windows_vox = {options.displacement.half_windows_vox.back()};
   one_round.wave_factors = {1.0};
-  const Displacement left = wall_displacement(field, mesh, smoother, one_round);
+  const Displacement left = wall_displacement(field, mesh, smoother, one_round, progress);
   MeshField residual{"residual_mm",
                      Eigen::VectorXd::Constant(tessellation.mesh.points_mm.cols(),
                                                std::numeric_limits<double>::quiet_NaN())};
+  if (progress.should_stop()) return residual;
   for (int k = 0; k < mesh.size(); ++k) {
     if (left.weight(k) > 0) residual.values(mesh.points[at(k)]) = left.normal_mm(k);
   }

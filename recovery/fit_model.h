@@ -73,8 +73,10 @@ Result<FittedModel> fit_tree(const CenterlineTree& tree, const Image<float>& ima
 // How far the image would still move each point of a tessellation of the model, along its normal
 // and smoothed by the rule of recovery/fit_displacement.h: "residual_mm", positive where the
 // image's wall lies farther out; NaN inside caps and where nothing could be measured. Large values
-// show where a fit needs a finer model, or the image another look. O(points).
+// show where a fit needs a finer model, or the image another look. Without a meaning once the
+// caller asked to stop. O(points).
 MeshField wall_residual(const Model& model, const Tessellation& tessellation,
-                        const Image<float>& image, const FitOptions& options = {});
+                        const Image<float>& image, const FitOptions& options = {},
+                        const Progress& progress = {});
 
 }  // namespace angiospline
