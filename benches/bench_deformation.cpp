@@ -2,6 +2,7 @@
 // pseudo-inverse, and the cost of an iteration on ever larger meshes.
 //   bench_deformation bifurcation        388 nodes or nearly; preparation and iterations apart
 //   bench_deformation linear [most 1000000]
+//   SNR=8 bench_deformation models        whole models by edges, their distance from the truth
 // CPU seconds of one thread.
 #include <algorithm>
 #include <cmath>
@@ -10,13 +11,17 @@
 #include <ctime>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "benches/fit_phantoms.h"
 #include <Eigen/SVD>
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include "modeling/seed_model.h"
+#include "modeling/tessellation.h"
+#include "recovery/deform_model.h"
 #include "recovery/deform_solver.h"
 #include "recovery/phantom.h"
 
@@ -142,12 +147,50 @@ void linear(double most) {
   }
 }
 
+// Whole models by edges, from their true centerlines and from a start beside them.
+void whole_models() {
+  const double snr = std::getenv("SNR") != nullptr ? std::atof(std::getenv("SNR")) : 8;
+  fmt::print("SNR {}; without what lies within two voxels of open ends\n", snr);
+  fmt::print("{:14} {:>6} {:>10} {:>10} {:>10} {:>10} {:>8} {:>6}\n", "phantom", "start",
+             "mean vox", "p95 vox", "bias vox", "missed %", "edges", "its");
+  constexpr std::pair<PhantomKind, const char*> kPhantoms[] = {
+      {PhantomKind::kCylinder, "cylinder"},
+      {PhantomKind::kBentVessel, "bent vessel"},
+      {PhantomKind::kBifurcation, "bifurcation"}};
+  for (const auto& [kind, name] : kPhantoms) {
+    const FitPhantom phantom = fit_phantom(kind);
+    const Image<float> image = with_noise(phantom, snr, 1);
+    for (const double off : {0.0, 1.0}) {
+      CenterlineTree tree = phantom.tree;
+      const Vec3 shift = off * phantom.voxel_mm * Vec3(0.8, 0.6, 0);
+      for (CenterlineNode& n : tree.nodes) n.position_mm += shift;
+      for (CenterlineBranch& b : tree.branches) {
+        b.points_mm.colwise() += shift;
+        b.radii_mm *= 1 + 0.1 * off;
+      }
+      const auto model = seed_model(tree);
+      if (!model) continue;
+      const auto result = deform_model(*model, image);
+      if (!result) {
+        fmt::print("{}: {}\n", name, result.error().message());
+        continue;
+      }
+      const auto mesh = tessellate(result->model.network);
+      const Accuracy a = accuracy(phantom, mesh->mesh, result->model.network.rims);
+      fmt::print("{:14} {:>6} {:10.3f} {:10.3f} {:10.3f} {:10.2f} {:8} {:6}\n", name,
+                 off == 0 ? "true" : "beside", a.mean_vox, a.p95_vox, a.bias_vox,
+                 missed_percent(phantom, mesh->mesh), result->edges, result->report.iterations);
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "bifurcation";
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
   if (what == "bifurcation") bifurcation();
+  if (what == "models") whole_models();
   if (what == "linear") linear(argc > 2 ? std::atof(argv[2]) : 1e6);
   return 0;
 }

@@ -160,7 +160,9 @@ Result<Fitted> fit_by_edges(const Model& model, const Image<float>& image,
   if (!deformed) return fail(deformed.error());
   Fitted result;
   result.parts = deformed->parts;
-  result.converged = deformed->report.termination == Termination::kAtRest;
+  result.converged =
+      deformed->report.termination == Termination::kAtRest && deformed->without_edge.empty();
+  result.unconverged = deformed->without_edge;
   result.iterations = deformed->report.iterations;
   result.force_unit = "potential";
   result.details = {{"method", arguments.solver},
@@ -170,6 +172,7 @@ Result<Fitted> fit_by_edges(const Model& model, const Image<float>& image,
                     {"mesh_nodes", deformed->nodes},
                     {"edges", deformed->edges},
                     {"control_points", deformed->model.network.control_points_mm.cols()},
+                    {"without_edge", deformed->without_edge},
                     {"coarsening_mm", deformed->coarsening_mm},
                     {"angle_before_deg", deformed->angle_before_deg},
                     {"angle_after_deg", deformed->angle_after_deg}};

@@ -5,19 +5,25 @@
 
 #include <fmt/format.h>
 
+#include "recovery/edge_localisation.h"
 #include "recovery/fit_model.h"
 
 namespace angiospline {
 namespace {
 
+// Of the default solver. Thin plates keep spurious edges from denting the wall; the membranes of
+// the small meshes of DeformOptions resist a change of radius, so they are left out. Each stage
+// starts at rest where the last one ended, so that plates resist only what the next one adds.
+constexpr double kBending = 10.0;
+constexpr int kStages = 3;
+constexpr double kNear = 2.0;  // voxels: edges pull no farther once the first stage is done
+
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
-// Rims' rows back into their planes; centres and radii anew.
+// Rims' rows back into their planes; centres and radii anew, from points of the rims.
 void flatten_rims(SurfaceNetwork& network) {
+  constexpr int kPoints = 16;  // of each side
   for (Rim& rim : network.rims) {
-    Vec3 center = Vec3::Zero();
-    double count = 0;
-    std::vector<int> columns;
     for (const Side& side : rim.sides) {
       const Patch& patch = network.patches[at(side.patch)];
       const int nu = patch.u.control_point_count(), nv = patch.v.control_point_count();
@@ -25,22 +31,22 @@ void flatten_rims(SurfaceNetwork& network) {
       for (int k = 0; k < (along_v ? nv : nu); ++k) {
         const int i = along_v ? (side.side == PatchSide::kU0 ? 0 : nu - 1) : k;
         const int j = along_v ? k : (side.side == PatchSide::kV0 ? 0 : nv - 1);
-        columns.push_back(patch.control[at(i * nv + j)]);
+        auto p = network.control_points_mm.col(patch.control[at(i * nv + j)]);
+        p -= rim.normal.dot(p - rim.center_mm) * rim.normal;
       }
     }
-    for (const int c : columns) {
-      Vec3 p = network.control_points_mm.col(c);
-      p -= rim.normal.dot(p - rim.center_mm) * rim.normal;
-      network.control_points_mm.col(c) = p;
-      center += p;
-      count += 1;
+    Points3 points(3, std::ssize(rim.sides) * kPoints);
+    Eigen::Index next = 0;
+    for (const Side& side : rim.sides) {
+      const BSplineSurface<3> surface = patch_surface(network, side.patch);
+      for (int k = 0; k < kPoints; ++k) {
+        const double along = (k + 0.5) / kPoints;
+        const Vec2 uv = side_parameters(network.patches[at(side.patch)], side.side, along);
+        points.col(next++) = surface.at(uv.x(), uv.y());
+      }
     }
-    rim.center_mm = center / count;
-    double radius = 0;
-    for (const int c : columns) {
-      radius += (network.control_points_mm.col(c) - rim.center_mm).norm() / count;
-    }
-    rim.radius_mm = radius;
+    rim.center_mm = points.rowwise().mean();
+    rim.radius_mm = (points.colwise() - rim.center_mm).colwise().norm().mean();
   }
 }
 
@@ -59,6 +65,31 @@ Points3 points_of_columns(const SurfaceNetwork& network) {
     }
   }
   return points;
+}
+
+// Edges that no open end's plane cuts off: a vessel that goes on past the model, or is round there,
+// would pull the end's nodes along its axis and together.
+EdgePoints within_rims(const EdgePoints& edges, const std::vector<Rim>& rims) {
+  constexpr double kBeside = 2.0;  // radii: what is farther from the axis belongs to something else
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index k = 0; k < edges.count(); ++k) {
+    const bool beyond = std::any_of(rims.begin(), rims.end(), [&](const Rim& rim) {
+      const Vec3 from = edges.at_mm.col(k) - rim.center_mm;
+      const double along = from.dot(rim.normal);
+      return along > 0 && along < kBeside * rim.radius_mm &&
+             (from - along * rim.normal).norm() < kBeside * rim.radius_mm;
+    });
+    if (!beyond) kept.push_back(k);
+  }
+  return {edges.at_mm(Eigen::all, kept), edges.normals(Eigen::all, kept), edges.strength(kept)};
+}
+
+EdgePoints between_voxels(EdgePoints edges, const std::vector<EdgePlace>& places) {
+  for (Eigen::Index k = 0; k < edges.count(); ++k) {
+    edges.at_mm.col(k) = places[at(k)].point_mm;
+    edges.normals.col(k) = -places[at(k)].normal;
+  }
+  return edges;
 }
 
 // Pool columns of the refined network are the mesh's nodes.
@@ -90,12 +121,46 @@ std::vector<PartFigures> figures_of_parts(const SurfaceNetwork& fine, const Poin
   return parts;
 }
 
+// Regions near which hardly any edge pulls go back to where they were, but for the nodes that they
+// share with others. Their names.
+std::vector<std::string> hold_unpulled(const SurfaceNetwork& fine, const DeformReport& report,
+                                       const Points3& start, Points3& nodes) {
+  constexpr double kLeastPulled = 0.1;  // share of a region's nodes
+  std::vector<std::string> names;
+  std::vector<char> moves(at(nodes.cols()), 0);
+  for (std::size_t r = 0; r < fine.regions.size(); ++r) {
+    int count = 0, pulled = 0;
+    for (const Patch& patch : fine.patches) {
+      if (at(patch.region) != r) continue;
+      for (const int c : patch.control) {
+        ++count;
+        pulled += report.edges_per_node[at(c)] > 0 ? 1 : 0;
+      }
+    }
+    if (pulled < kLeastPulled * count) {
+      names.push_back(fine.regions[r].name);
+      continue;
+    }
+    for (const Patch& patch : fine.patches) {
+      if (at(patch.region) != r) continue;
+      for (const int c : patch.control) moves[at(c)] = 1;
+    }
+  }
+  for (Eigen::Index k = 0; k < nodes.cols(); ++k) {
+    if (!moves[at(k)]) nodes.col(k) = start.col(k);
+  }
+  return names;
+}
+
 }  // namespace
 
 Result<DeformedModel> deform_model(const Model& model, const Image<float>& image,
                                    const DeformModelOptions& options, const Progress& progress) {
   if (auto apart = frames_apart(model.network.control_points_mm, image.grid)) return fail(*apart);
-  const auto field = find_edges(image, {EdgePercentile{options.edge_percentile}}, progress);
+  const bool ours = options.method == DeformMethod::kSparse;
+  EdgeOptions sought{EdgePercentile{options.edge_percentile}};
+  if (ours) sought.thinning = EdgeThinning::kAcross;
+  const auto field = find_edges(image, sought, progress);
   if (!field) return fail(field.error());
   NetworkMeshOptions fineness;
   fineness.least_pieces = options.pieces;
@@ -109,12 +174,30 @@ Result<DeformedModel> deform_model(const Model& model, const Image<float>& image
   how.most_iterations = options.most_iterations;
   how.potential.bright_inside = !options.dark;
   if (options.stiffness) how.elements.spring = *options.stiffness;
-  auto deformed = deform(start, edge_points(*field, image.grid), voxel, how, progress);
+  EdgePoints edges = edge_points(*field, image.grid);
+  if (ours) edges = between_voxels(std::move(edges), localise_edges(image, *field));
+  edges = within_rims(edges, model.network.rims);
+  if (ours) {
+    how.elements.membrane = 0.0;
+    how.elements.bending = kBending;
+    how.potential.farthest_vox = options.reach_vox;
+  }
+  auto deformed = deform(start, edges, voxel, how, progress);
+  int iterations = deformed ? deformed->report.iterations : 0;
+  for (int again = 0; ours && deformed && again < kStages - 1; ++again) {
+    if (deformed->report.termination == Termination::kUnstable) break;
+    how.potential.farthest_vox = std::min(options.reach_vox, kNear);
+    deformed = deform(deformed->mesh, edges, voxel, how, progress);
+    if (deformed) iterations += deformed->report.iterations;
+  }
   if (!deformed) return fail(deformed.error());
+  deformed->report.iterations = iterations;
 
   DeformedModel result;
+  result.without_edge =
+      hold_unpulled(fine->network, deformed->report, start.nodes_mm, deformed->mesh.nodes_mm);
   result.nodes = start.node_count();
-  result.edges = static_cast<int>(field->edges.size());
+  result.edges = static_cast<int>(edges.count());
   result.mesh = triangles_of(deformed->mesh, Caps::kFans);
   result.residual_force = residual_field(deformed->report, result.mesh);
   result.parts = figures_of_parts(fine->network, deformed->mesh.nodes_mm - start.nodes_mm,
@@ -135,6 +218,10 @@ Result<DeformedModel> deform_model(const Model& model, const Image<float>& image
     if (part.outcome != SmoothedPart::Outcome::kRefused) continue;
     result.model.warnings.push_back(
         fmt::format("{} could not be made smooth after the deformation: {}", part.name, part.why));
+  }
+  for (const std::string& name : result.without_edge) {
+    result.model.warnings.push_back(
+        fmt::format("no edge found in the image near {}: it was left as it was", name));
   }
   if (result.report.termination != Termination::kAtRest) {
     result.model.warnings.push_back(fmt::format("the deformation did not come to rest: {}",

@@ -38,6 +38,7 @@ struct DeformedModel {
   double coarsening_mm = 0.0;     // the way back to B-splines moved no control point farther
   double angle_before_deg = 0.0;  // between neighbours' normals, before they were made smooth
   double angle_after_deg = 0.0;
+  std::vector<std::string> without_edge;  // regions near which the image shows none: as seeded
   std::vector<PartFigures>
       parts;  // residual forces and moves of the nodes of each region, and of all
 };
@@ -45,6 +46,8 @@ struct DeformedModel {
 // The model's network is refined to a finite-element mesh (of points of its surface), deformed
 // among the image's edges (recovery/deform_solver.h), brought back to its own knots and made
 // tangent-plane continuous again with floating boundaries; ends are brought back to their planes.
+// Edges beyond an end's plane do not count. The default solver goes by thin edges between voxels
+// (recovery/edge_localisation.h) in three stages, the others by the thesis's thick ones in one.
 // Junctions that cannot be made smooth are named in the model's warnings. Errors: those of
 // find_edges, refine_network, deform; the model lies outside the image; kCancelled.
 Result<DeformedModel> deform_model(const Model& model, const Image<float>& image,

@@ -1,10 +1,12 @@
 // A whole model deformed the thesis's way: edges, a solver by name, back to smooth patches.
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "modeling/certificate.h"
 #include "modeling/seed_model.h"
+#include "modeling/tessellation.h"
 #include "recovery/deform_model.h"
 #include "recovery/phantom.h"
 
@@ -64,6 +66,87 @@ TEST(DeformModel, ComesBackAsAClosedSmoothModelNearerToTheWall) {
       }
     }
   }
+}
+
+TEST(DeformModel, ComesWithinATenthOfAVoxelOfANoisyTubeFiveVoxelsWide) {
+  // From the true centerline; what lies within two voxels of the open ends is left out.
+  PhantomOptions options;
+  options.snr = 8;
+  const auto phantom = make_phantom(PhantomKind::kBentVessel, options);
+  Image<float> image(phantom->image.grid);
+  for (std::size_t i = 0; i < image.voxels.size(); ++i) image.voxels[i] = phantom->image.voxels[i];
+  const auto start = seed_model(phantom->tree);
+  ASSERT_TRUE(start);
+  const auto result = deform_model(*start, image);
+  ASSERT_TRUE(result) << result.error().message();
+  EXPECT_EQ(result->report.termination, Termination::kAtRest);
+  EXPECT_TRUE(result->without_edge.empty());
+  const CenterlineBranch& branch = phantom->tree.branches.front();
+  const auto off = [&](const Vec3& p) {
+    double least = 1e9;
+    for (Eigen::Index k = 0; k + 1 < branch.points_mm.cols(); ++k) {
+      const Vec3 a = branch.points_mm.col(k), b = branch.points_mm.col(k + 1);
+      const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+      least = std::min(least, (a + t * (b - a) - p).norm());
+    }
+    return std::abs(least - branch.radii_mm(0));
+  };
+  double sum = 0;
+  int count = 0;
+  const auto mesh = tessellate(result->model.network);
+  for (Eigen::Index k = 0; k < mesh->mesh.points_mm.cols(); ++k) {
+    const Vec3 p = mesh->mesh.points_mm.col(k);
+    const bool end =
+        std::any_of(start->network.rims.begin(), start->network.rims.end(),
+                    [&](const Rim& rim) { return (p - rim.center_mm).dot(rim.normal) > -2; });
+    if (end) continue;
+    sum += off(p);
+    ++count;
+  }
+  EXPECT_GT(count, 200);
+  EXPECT_LT(sum / count, 0.1);  // 0.24 with thick edges, no gate and soft membranes
+}
+
+TEST(DeformModel, LeavesABranchWithoutEdgesAsItWasAndSaysWhich) {
+  const auto phantom = make_phantom(PhantomKind::kBifurcation);
+  const auto start = seed_model(phantom->tree);
+  Image<float> image(phantom->image.grid);
+  for (std::size_t i = 0; i < image.voxels.size(); ++i) image.voxels[i] = phantom->image.voxels[i];
+  // The thinner daughter's vessel is blotted out, from half a diameter beyond the junction.
+  std::string name;
+  Vec3 from = Vec3::Zero(), along = Vec3::Zero();
+  double thinnest = 1e9;
+  for (const Rim& rim : start->network.rims) {
+    if (rim.radius_mm >= thinnest) continue;
+    thinnest = rim.radius_mm;
+    along = rim.normal;
+    from = rim.center_mm;
+    name =
+        start->network
+            .regions[static_cast<std::size_t>(
+                start->network.patches[static_cast<std::size_t>(rim.sides.front().patch)].region)]
+            .name;
+  }
+  for (std::size_t i = 0; i < image.voxels.size(); ++i) {
+    const Voxel v = image.grid.voxel(i);
+    const Vec3 p = image.grid.world_mm(v) - from;
+    const double s = p.dot(along);
+    if (s > -34 && (p - s * along).norm() < 16) image.voxels[i] = 200;
+  }
+  const auto result = deform_model(*start, image);
+  ASSERT_TRUE(result) << result.error().message();
+  ASSERT_EQ(result->without_edge, std::vector<std::string>{name});
+  int warned = 0;
+  for (const std::string& text : result->model.warnings)
+    warned += text.find("no edge found in the image near " + name) != std::string::npos ? 1 : 0;
+  EXPECT_EQ(warned, 1);
+  int at_end = 0;
+  for (std::size_t r = 0; r < start->network.rims.size(); ++r) {
+    if (start->network.rims[r].radius_mm != thinnest) continue;
+    EXPECT_NEAR(result->model.network.rims[r].radius_mm, thinnest, 0.01);
+    ++at_end;
+  }
+  EXPECT_EQ(at_end, 1);
 }
 
 TEST(DeformModel, NamesWhatIsWrong) {
