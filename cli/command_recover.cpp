@@ -12,6 +12,7 @@
 #include "io/centerline_export.h"
 #include "io/certificate_json.h"
 #include "io/report_html.h"
+#include "recovery/closed_pieces.h"
 #include "recovery/fit_model.h"
 #include "recovery/morphology.h"
 #include "recovery/topology_numbers.h"
@@ -81,9 +82,10 @@ std::optional<Error> flooded(const Mask& mask, const std::string& image) {
 }
 
 // The model of a tree, fitted to the image; where that cannot be done the walls are as the mask's
-// radii have them, with a warning.
-Result<Model> model_of(const CenterlineTree& tree, const RecoverArguments& arguments,
-                       const Progress& progress, Stopwatch& watch) {
+// radii have them, with a warning. Pieces of the mask without branches become closed surfaces.
+Result<Model> model_of(const CenterlineTree& tree, const Mask& closed,
+                       const RecoverArguments& arguments, const Progress& progress,
+                       Stopwatch& watch) {
   std::optional<Error> unfit;
   if (arguments.fit) {
     const std::string& path = arguments.segment.image;
@@ -91,17 +93,25 @@ Result<Model> model_of(const CenterlineTree& tree, const RecoverArguments& argum
     if (!file) return fail(file.error());
     FitOptions options;
     options.dark = arguments.segment.dark;
-    auto fitted = grey_image(file->image, path).and_then([&](const Image<float>& image) {
-      return fit_tree(tree, image, options, progress);
-    });
+    const auto image = grey_image(file->image, path);
+    auto fitted = image ? fit_tree(tree, *image, options, progress)
+                        : Result<FittedModel>(fail(image.error()));
+    if (fitted) {
+      auto added = add_closed_pieces(fitted->model, closed, &*image, options, progress);
+      watch.lap("fit");
+      if (!added) return fail(added.error());
+      return std::move(fitted->model);
+    }
     watch.lap("fit");
-    if (fitted) return std::move(fitted->model);
     if (fitted.error().kind == ErrorKind::kCancelled) return fail(fitted.error());
     unfit = fitted.error();
   }
   auto model = seed_model(tree, {}, progress);
   if (model && unfit) {
     model->warnings.push_back("the walls were not fitted to the image: " + unfit->message());
+  }
+  if (model) {
+    if (auto added = add_closed_pieces(*model, closed, nullptr); !added) return fail(added.error());
   }
   watch.lap("model");
   return model;
@@ -118,12 +128,14 @@ Result<Recovered> recover(const RecoverArguments& arguments, const OutputFolder&
   auto vessels = vessels_from_mask(segmented->mask, options, progress);
   if (!vessels) return fail(vessels.error());
   watch.lap("graph");
+  TreeAndPieces parted = part_closed_pieces(segmented->mask, vessels->skeleton, vessels->tree);
+  vessels->tree = std::move(parted.tree);
   vessels->tree.source = arguments.segment.image;
   if (auto written = write_stage_files(folder, segmented->mask, *vessels); !written) {
     return fail(written.error());
   }
   watch.lap("write stages");
-  auto model = model_of(vessels->tree, arguments, progress, watch);
+  auto model = model_of(vessels->tree, parted.pieces, arguments, progress, watch);
   if (!model) return fail(model.error());
   model->name = fs::path(arguments.segment.image).stem().stem().string();
   const SegmentReport& report = segmented->report;

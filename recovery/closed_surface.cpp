@@ -18,7 +18,6 @@ namespace {
 
 constexpr int kDegree = kPatchSize - 1;
 constexpr int kSamples = 12;       // along each side of a patch
-constexpr int kFewestVoxels = 30;  // of a piece: less is no surface
 constexpr double kThinnest = 0.5;  // voxels: the least half axis
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -208,7 +207,7 @@ Result<Model> closed_model(const Mask& mask) {
   model.name = "closed";
   int small = 0;
   for (const Piece& piece : pieces) {
-    if (piece.count < kFewestVoxels) {
+    if (piece.count < kFewestClosedVoxels) {
       ++small;
       continue;
     }
@@ -226,11 +225,11 @@ Result<Model> closed_model(const Mask& mask) {
                  "the mask has no piece large enough for a surface",
                  {},
                  fmt::format("{} pieces", pieces.size()),
-                 fmt::format("a piece has at least {} voxels", kFewestVoxels)});
+                 fmt::format("a piece has at least {} voxels", kFewestClosedVoxels)});
   }
   if (small > 0) {
     model.warnings.push_back(
-        fmt::format("{} pieces of the mask below {} voxels were left out", small, kFewestVoxels));
+        fmt::format("{} pieces of the mask below {} voxels were left out", small, kFewestClosedVoxels));
   }
   return model;
 }

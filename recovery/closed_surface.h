@@ -21,6 +21,9 @@ SurfaceNetwork closed_surface(const Vec3& center_mm, const Mat3& half_axes_mm,
 // with whole sides and nothing else. By region; empty for all others.
 std::vector<std::vector<int>> closed_patches(const SurfaceNetwork& network);
 
+// Of a piece of a mask that becomes a closed surface.
+inline constexpr int kFewestClosedVoxels = 30;
+
 // One ellipsoid for each 26-connected piece of the mask, with its centre and second moments, the
 // largest first. Pieces below 30 voxels are left out, with a warning that says how many.
 // Errors: an empty mask, or one of small pieces only.

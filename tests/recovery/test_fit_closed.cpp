@@ -1,5 +1,6 @@
 // Closed surfaces: the template, the start from a mask, the fit; and groups of patches that move
 // only as far as they stay sound.
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -7,6 +8,7 @@
 
 #include "modeling/certificate.h"
 #include "modeling/tessellation.h"
+#include "recovery/closed_pieces.h"
 #include "recovery/closed_surface.h"
 #include "recovery/fit_model.h"
 #include "recovery/fit_patches.h"
@@ -35,6 +37,61 @@ TEST(ClosedSurface, IsASmoothSphereOfSixPatchesAndMore) {
     EXPECT_EQ(certificate->genus, 0);
     EXPECT_NEAR(certificate->volume_mm3, 4.0 / 3 * 3.14159265358979 * 64, 0.3);
   }
+}
+
+// A rod along x and a ball, each with one branch through it and the voxels of its axis.
+struct RodAndBall {
+  Mask mask{ImageGrid{{48, 40, 40}, Vec3::Ones(), Vec3::Zero(), Mat3::Identity()}};
+  Mask skeleton{mask.grid};
+  CenterlineTree tree;
+
+  explicit RodAndBall(const Vec3& ball, bool with_rod = true) {
+    const auto add = [&](const char* name, const Vec3& a, const Vec3& b, double radius) {
+      const int n = static_cast<int>(tree.nodes.size());
+      tree.nodes.push_back({std::string(name) + "_a", a});
+      tree.nodes.push_back({std::string(name) + "_b", b});
+      CenterlineBranch branch{name, n, n + 1, Points3(3, 3), Eigen::VectorXd::Constant(3, radius)};
+      branch.points_mm << a, (a + b) / 2, b;
+      tree.branches.push_back(branch);
+      tree.inlets.push_back(n);
+      for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
+        const Vec3 p = mask.grid.world_mm(mask.grid.voxel(i)) - a;
+        const double t = std::clamp(p.dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+        const double off = (p - t * (b - a)).norm();
+        if (off < radius) mask.voxels[i] = 1;
+        if (off < 0.6) skeleton.voxels[i] = 1;
+      }
+    };
+    add("ball", ball - Vec3(2, 0, 0), ball + Vec3(2, 0, 0), 6);
+    if (with_rod) add("rod", Vec3(6, 8, 8), Vec3(40, 8, 8), 3);
+  }
+  TreeAndPieces parted() const { return part_closed_pieces(mask, skeleton, tree); }
+};
+
+TEST(ClosedPieces, AreThoseWhoseOnlyBranchIsShort) {
+  const RodAndBall both(Vec3(24, 26, 26));
+  const TreeAndPieces parted = both.parted();
+  ASSERT_EQ(parted.tree.branches.size(), 1U);
+  EXPECT_EQ(parted.tree.branches[0].name, "rod");
+  ASSERT_EQ(parted.tree.nodes.size(), 2U);
+  EXPECT_EQ(parted.tree.nodes[static_cast<std::size_t>(parted.tree.branches[0].from)].name,
+            "rod_a");
+  EXPECT_EQ(parted.tree.inlets, std::vector<int>{0});
+  for (std::size_t i = 0; i < both.mask.voxels.size(); ++i) {
+    const bool of_ball = both.mask.voxels[i] != 0 && both.mask.grid.voxel(i)[1] > 15;
+    EXPECT_EQ(parted.pieces.voxels[i] != 0, of_ball);
+  }
+  // A vessel cut by the border is a vessel, however short; and one piece at least stays a vessel.
+  int whole = 0;
+  for (const RodAndBall& other :
+       {RodAndBall(Vec3(42, 26, 26)), RodAndBall(Vec3(24, 26, 26), false)}) {
+    const TreeAndPieces same = other.parted();
+    EXPECT_EQ(same.tree.branches.size(), other.tree.branches.size());
+    EXPECT_EQ(std::count(same.pieces.voxels.begin(), same.pieces.voxels.end(), 0),
+              std::ssize(same.pieces.voxels));
+    ++whole;
+  }
+  EXPECT_EQ(whole, 2);
 }
 
 TEST(ClosedSurface, IsFoundAmongOtherRegions) {
