@@ -144,10 +144,14 @@ class Fitter {
     report.degrees_of_freedom = displacement.degrees_of_freedom;
     report.wave_factor = displacement.wave_factor;
     if (!(report.contrast > 0)) {
-      return fail({ErrorKind::kBadInput, "the vessel is not brighter than its background", "fit",
-                   fmt::format("{:.4g}", report.contrast),
-                   "grey inside minus grey outside the model's wall must be positive; dark vessels "
-                   "need --dark"});
+      return fail({ErrorKind::kBadInput,
+                   fmt::format("the vessel is not {} than its background",
+                               options_.dark ? "darker" : "brighter"),
+                   "fit", fmt::format("{:.4g}", report.contrast),
+                   options_.dark ? "grey outside minus grey inside the model's wall must be "
+                                   "positive; bright vessels need no --dark"
+                                 : "grey inside minus grey outside the model's wall must be "
+                                   "positive; dark vessels need --dark"});
     }
     std::vector<char> hold(network.regions.size(), 0);
     for (std::size_t r = 0; r < displacement.evidence.size(); ++r) {

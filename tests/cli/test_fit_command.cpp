@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -133,6 +134,15 @@ TEST_F(Fit, SaysInOneLineWhatIsWrong) {
 
   refused({"fit", seed, image, "-o", out, "--truth", folder_ / "apart.nrrd"},
           "apart.nrrd: the truth is not of the image's size");
+  auto shifted = read_image(folder_ / "truth.nrrd");
+  ASSERT_TRUE(shifted);
+  std::visit([](auto& truth) { truth.grid.origin_mm += Vec3(3, 0, 0); }, shifted->image);
+  ASSERT_TRUE(std::visit(
+      [&](const auto& truth) { return write_image(truth, folder_ / "off.nrrd"); }, shifted->image));
+  refused({"fit", seed, image, "-o", out, "--residual", folder_ / "left.vtp", "--truth",
+           folder_ / "off.nrrd"},
+          "off.nrrd: the truth does not lie where the image does");
+  refused({"fit", seed, image, "-o", out, "--dark"}, "the vessel is not darker");
   refused({"fit", folder_ / "tree.swc", image, "-o", out},
           "only a native model or a mask can be fitted");
   refused({"fit", seed, image, "-o", out, "--solver", "sparse", "--strength", "0"}, "strength");
@@ -140,6 +150,7 @@ TEST_F(Fit, SaysInOneLineWhatIsWrong) {
   refused({"fit", seed, image, "-o", out, "--potential", "gravity"}, "--solver");
   refused({"fit", seed, image, "-o", out, "--residual", folder_ / "r.stl"}, ".glb or .vtp");
   EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "left.vtp"));
 }
 
 }  // namespace
