@@ -228,8 +228,8 @@ Result<Model> closed_model(const Mask& mask) {
                  fmt::format("a piece has at least {} voxels", kFewestClosedVoxels)});
   }
   if (small > 0) {
-    model.warnings.push_back(
-        fmt::format("{} pieces of the mask below {} voxels were left out", small, kFewestClosedVoxels));
+    model.warnings.push_back(fmt::format("{} pieces of the mask below {} voxels were left out",
+                                         small, kFewestClosedVoxels));
   }
   return model;
 }
