@@ -92,6 +92,7 @@ Json report_json(const FitReport& report) {
   return {{"method", "wall"},
           {"contrast", report.contrast},
           {"noise", report.noise},
+          {"noise_kind", report.noise_kind == NoiseKind::kRician ? "rician" : "white"},
           {"snr", report.snr},
           {"mesh_nodes", report.nodes},
           {"control_points", report.control_points},
@@ -133,9 +134,11 @@ Result<Fitted> fit_walls(const Model& model, const Image<float>& image,
   result.details = report_json(report);
   result.details["mean_residual_mm"] = left;
   result.summary = fmt::format(
-      "SNR {:.3g}; axes moved {:.3g} mm, walls {:.3g} mm; {:.3g} mm left; {} control points "
+      "{} noise, SNR {:.3g}; axes moved {:.3g} mm, walls {:.3g} mm; {:.3g} mm left; {} control "
+      "points "
       "({} before data reduction)",
-      report.snr, report.mean_axis_move_mm, report.mean_move_mm, left, report.control_points,
+      report.noise_kind == NoiseKind::kRician ? "Rician" : "white", report.snr,
+      report.mean_axis_move_mm, report.mean_move_mm, left, report.control_points,
       report.control_points_before_reduction);
   result.residual_mesh = std::move(mesh->mesh);
   result.residual = std::move(residual);

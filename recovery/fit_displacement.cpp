@@ -12,20 +12,12 @@
 namespace angiospline {
 namespace {
 
-constexpr double kBestSnr = 20.0;        // beyond it other errors than noise count
-constexpr double kNeighbourRise = 0.35;  // of the contrast: grey that is another vessel's
-constexpr double kNoiseRise = 4.0;       // standard deviations of noise that are no vessel
-constexpr double kOutsideWave = 5.0;     // radii over which the background may vary
-constexpr double kInsideMean = 8.0;      // radii over which the inside is averaged
-constexpr int kLevelRounds = 2;          // the second without the first one's outliers
-constexpr double kLevelMean = 3.0;       // radii over which the wall is averaged for the levels
+constexpr double kLevelMean = 3.0;   // radii over which the wall is averaged for the levels
 constexpr double kNodeNoise = 0.65;  // of a voxel's noise left by interpolation across a profile
-constexpr double kOutlier = 3.0;     // standard deviations from which a value counts less
 constexpr double kLeastContrast = 0.25;  // of the median: less is no wall
 constexpr double kWaveVox = 32.0;        // L of SNR 1
 constexpr double kWaveExponent = -0.4;
-constexpr double kWaveRadii = 2.5;       // the longest L of factor one
-constexpr double kNormalScale = 1.4826;  // median absolute deviation to standard deviation
+constexpr double kWaveRadii = 2.5;  // the longest L of factor one
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
@@ -36,142 +28,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// A node where it has come to, with the curvatures of the parallel surface.
-WallPoint moved(const WallPoint& node, double d) {
-  WallPoint p = node;
-  p.point_mm += d * node.normal;
-  const auto parallel = [&](double curvature) {
-    const double growth = 1 + curvature * d;
-    return growth > 0.2 ? curvature / growth : curvature / 0.2;
-  };
-  p.largest_curvature = parallel(node.largest_curvature);
-  p.smallest_curvature = parallel(node.smallest_curvature);
-  return p;
-}
-
-std::vector<WallSides> all_sides(const GreyField& field, const FitMesh& mesh,
-                                 const Eigen::VectorXd& displacement, double gate) {
-  std::vector<WallSides> sides(mesh.nodes.size());
-  tbb::parallel_for(std::size_t{0}, sides.size(), [&](std::size_t k) {
-    const WallPoint p = moved(mesh.nodes[k], displacement(static_cast<Eigen::Index>(k)));
-    sides[k] = wall_sides(field, p, gate);
-  });
-  return sides;
-}
-
-// The voxel nearest to a place; nothing beyond the image.
-double voxel_at(const GreyField& field, const Vec3& p) {
-  const Vec3 x = field.image().grid.index_vox(p);
-  const Voxel v{static_cast<int>(std::lround(x(0))), static_cast<int>(std::lround(x(1))),
-                static_cast<int>(std::lround(x(2)))};
-  return field.image().grid.contains(v) ? static_cast<double>(field.image()[v])
-                                        : std::numeric_limits<double>::quiet_NaN();
-}
-
-double deviation_of(std::vector<double> residuals) {
-  for (double& r : residuals) r = std::abs(r);
-  return kNormalScale * median(std::move(residuals));
-}
-
-// Deviation of voxels two widths outside the wall from one level: noise, and the background's own
-// variation.
-double noise_beyond(const GreyField& field, const FitMesh& mesh,
-                    const Eigen::VectorXd& displacement, double level) {
-  std::vector<double> residuals;
-  for (std::size_t k = 0; k < mesh.nodes.size(); ++k) {
-    const WallPoint p = moved(mesh.nodes[k], displacement(static_cast<Eigen::Index>(k)));
-    const double grey = voxel_at(field, p.point_mm + 2 * field.width_mm(p.normal) * p.normal);
-    if (std::isfinite(grey)) residuals.push_back(grey - level);
-  }
-  return deviation_of(std::move(residuals));
-}
-
-// Lets values far from the smooth ones count less; true if there was a scale to judge by.
-void weigh_outliers(const Eigen::VectorXd& residual, const Eigen::VectorXd& base, double floor,
-                    Eigen::VectorXd& weights) {
-  std::vector<double> known;
-  for (Eigen::Index k = 0; k < base.size(); ++k) {
-    if (base(k) > 0) known.push_back(residual(k));
-  }
-  const double reach = kOutlier * std::max(floor, deviation_of(known));
-  for (Eigen::Index k = 0; k < base.size(); ++k) {
-    const double r = residual(k) / reach;
-    weights(k) = reach > 0 ? base(k) / std::max(1.0, r * r) : base(k);
-  }
-}
-
-}  // namespace
-
-double WallGreys::snr() const {
-  return noise * kBestSnr > std::abs(contrast) ? std::abs(contrast) / noise : kBestSnr;
-}
-
-WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
-                     const Eigen::VectorXd& displacement) {
-  const Eigen::Index n = mesh.size();
-  std::vector<double> in, out;
-  std::vector<WallSides> sides =
-      all_sides(field, mesh, displacement, std::numeric_limits<double>::infinity());
-  for (const WallSides& s : sides) {
-    if (s.inside_weight > 0) in.push_back(s.inside);
-    if (s.outside_weight > 0) out.push_back(s.outside);
-  }
-  if (in.empty()) {  // nothing but thin vessels: their middles, of which the brighter half is purer
-    for (const WallPoint& node : mesh.nodes) {
-      if (node.largest_curvature > 0) {
-        in.push_back(field.at(node.point_mm - 0.9 / node.largest_curvature * node.normal));
-      }
-    }
-  }
-  const double inside = median(in);
-  const double outside = median(out);
-  const double noise = noise_beyond(field, mesh, displacement, outside);
-  const double gate = std::max(kNeighbourRise * std::abs(inside - outside), kNoiseRise * noise);
-  sides = all_sides(field, mesh, displacement, gate);
-
-  Eigen::VectorXd inner(n), outer(n), inner_weight(n), outer_weight(n), waves(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const WallSides& s = sides[at(k)];
-    inner(k) = s.inside - inside;
-    outer(k) = s.outside - outside;
-    inner_weight(k) = mesh.near_rim[at(k)] ? 0.0 : s.inside_weight;
-    outer_weight(k) = mesh.near_rim[at(k)] ? 0.0 : s.outside_weight;
-    waves(k) = kOutsideWave * mesh.radii_mm[at(k)];
-  }
-  const double radius = median(mesh.radii_mm);
-  WallGreys greys;
-  Eigen::VectorXd w_in = inner_weight, w_out = outer_weight;
-  for (int round = 0; round < kLevelRounds; ++round) {
-    greys.inside = smoother.mean(inner, w_in, kInsideMean * radius);
-    greys.outside = smoother.fair(outer, w_out, waves);
-    weigh_outliers(inner - greys.inside, inner_weight, 0.0, w_in);
-    weigh_outliers(outer - greys.outside, outer_weight, 0.0, w_out);
-  }
-  greys.inside.array() += inside;
-  greys.outside.array() += outside;
-  const Eigen::VectorXd contrast = greys.inside - greys.outside;
-  greys.contrast = median({contrast.data(), contrast.data() + n});
-
-  std::vector<double> residuals, beyond;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const WallPoint p = moved(mesh.nodes[at(k)], displacement(k));
-    const double width = field.width_mm(p.normal);
-    if (inner_weight(k) > 0) {
-      const double depth = std::min(1.6 * width, 0.9 / std::max(1e-300, p.largest_curvature));
-      const double grey = voxel_at(field, p.point_mm - depth * p.normal);
-      if (std::isfinite(grey)) residuals.push_back(grey - greys.inside(k));
-    }
-    if (outer_weight(k) > 0) {
-      const double grey = voxel_at(field, p.point_mm + 2 * width * p.normal);
-      if (std::isfinite(grey)) beyond.push_back(grey - greys.outside(k));
-    }
-  }
-  greys.noise = deviation_of(residuals.size() >= 50 ? std::move(residuals) : std::move(beyond));
-  return greys;
-}
-
-namespace {
-
 // One round's measurements.
 struct Offsets {
   Eigen::VectorXd mm;
@@ -180,17 +36,18 @@ struct Offsets {
 
 Offsets measure_offsets(const GreyField& field, const FitMesh& mesh, const WallGreys& greys,
                         const Eigen::VectorXd& displacement, double half_window) {
+  const ProfileSag sag(field, mesh, greys, displacement, half_window);
   Offsets all{Eigen::VectorXd::Zero(mesh.size()), Eigen::VectorXd::Zero(mesh.size())};
   tbb::parallel_for(std::size_t{0}, mesh.nodes.size(), [&](std::size_t i) {
     const auto k = static_cast<Eigen::Index>(i);
     const WallLevels levels{greys.inside(k), greys.outside(k)};
     const bool clear = levels.contrast() >= kLeastContrast * greys.contrast;
     if (mesh.near_rim[i] || !clear) return;
-    const WallPoint p = moved(mesh.nodes[i], displacement(k));
+    const WallPoint p = parallel_point(mesh.nodes[i], displacement(k));
     const WallOffset offset =
         wall_offset(field, p, levels, {half_window, std::min(greys.noise, greys.contrast)});
     if (!offset.measured) return;
-    all.mm(k) = offset.offset_mm;
+    all.mm(k) = offset.offset_mm - sag.offset_mm(field, p);
     const double relative = levels.contrast() / greys.contrast;
     all.weight(k) =
         std::min(1.0, relative * relative) * 2 * half_window * field.voxel_mm() / offset.window_mm;
@@ -203,7 +60,7 @@ std::vector<double> region_evidence(const GreyField& field, const FitMesh& mesh,
   const int regions = *std::max_element(mesh.regions.begin(), mesh.regions.end()) + 1;
   std::vector<double> sum(at(regions), 0.0), count(at(regions), 0.0);
   for (std::size_t k = 0; k < mesh.nodes.size(); ++k) {
-    const WallPoint p = moved(mesh.nodes[k], displacement(static_cast<Eigen::Index>(k)));
+    const WallPoint p = parallel_point(mesh.nodes[k], displacement(static_cast<Eigen::Index>(k)));
     const double width = field.width_mm(p.normal);
     const double in = std::min(width, 0.9 / std::max(1e-300, p.largest_curvature));
     const Vec3 inner = p.point_mm - in * p.normal;

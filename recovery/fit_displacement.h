@@ -3,24 +3,9 @@
 
 #include <vector>
 
-#include "recovery/fit_mesh.h"
+#include "recovery/wall_greys.h"
 
 namespace angiospline {
-
-// Grey values on both sides of the wall at each node, and the noise.
-struct WallGreys {
-  Eigen::VectorXd inside;
-  Eigen::VectorXd outside;
-  double contrast = 0.0;  // median of inside - outside
-  double noise = 0.0;     // standard deviation of a voxel
-  double snr() const;     // contrast over noise, at most 20
-};
-
-// Robust and local: means of what lies one to three voxels from the wall, smooth over some five
-// radii outside (so that a background may rise across a vessel) and some eight inside; a vessel too
-// thin to have an inside takes its level from its neighbours. Other vessels beside it are left out.
-WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
-                     const Eigen::VectorXd& displacement_mm);
 
 struct DisplacementOptions {
   std::vector<double> half_windows_vox{1.5, 0.75};  // of the profile, one for each round

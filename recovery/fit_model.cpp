@@ -138,6 +138,7 @@ class Fitter {
     if (progress_.should_stop()) return fail(cancelled("wall"));
     report.contrast = displacement.greys.contrast;
     report.noise = displacement.greys.noise;
+    report.noise_kind = displacement.greys.kind;
     report.snr = displacement.greys.snr();
     report.nodes = mesh->size();
     report.iterations += static_cast<int>(options.half_windows_vox.size());

@@ -29,10 +29,11 @@ struct FitOptions {
 
 struct FitReport {
   double contrast = 0.0;  // grey of the vessel above its background
-  double noise = 0.0;     // standard deviation of a voxel's grey
-  double snr = 0.0;       // contrast over noise, at most 20
-  int iterations = 0;     // times that the wall was measured
-  int nodes = 0;          // of the finite-element mesh
+  double noise = 0.0;     // standard deviation of a voxel's grey, or of Rician noise's two parts
+  NoiseKind noise_kind = NoiseKind::kWhite;
+  double snr = 0.0;    // contrast over noise, at most 20
+  int iterations = 0;  // times that the wall was measured
+  int nodes = 0;       // of the finite-element mesh
   int control_points = 0;
   int control_points_before_reduction = 0;
   double reduction_mm = 0.0;        // its tolerance; 0: none

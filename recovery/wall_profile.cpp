@@ -104,6 +104,18 @@ double GreyField::width_mm(const Vec3& n) const {
   return (image_.grid.direction.transpose() * n).cwiseProduct(image_.grid.spacing_mm).norm();
 }
 
+WallPoint parallel_point(const WallPoint& at, double offset) {
+  constexpr double kLeastGrowth = 0.2;
+  WallPoint p = at;
+  p.point_mm += offset * at.normal;
+  const auto parallel = [&](double curvature) {
+    return curvature / std::max(kLeastGrowth, 1 + curvature * offset);
+  };
+  p.largest_curvature = parallel(at.largest_curvature);
+  p.smallest_curvature = parallel(at.smallest_curvature);
+  return p;
+}
+
 WallOffset wall_offset(const GreyField& field, const WallPoint& at, const WallLevels& levels,
                        const ProfileOptions& options) {
   WallOffset result;

@@ -43,6 +43,10 @@ struct WallPoint {
   double smallest_curvature = 0.0;
 };
 
+// The place that lies `offset_mm` farther out along the normal, on the parallel surface. Curvatures
+// grow to five times what they were at most.
+WallPoint parallel_point(const WallPoint& at, double offset_mm);
+
 // Grey values of the vessel and of what lies around it, near one place.
 struct WallLevels {
   double inside = 1.0;
