@@ -10,8 +10,6 @@
 namespace angiospline {
 namespace {
 
-constexpr int kPenaltyOrder = 2;  // the penalty's null space: straight lines
-
 // Gauss-Legendre with 4 points on [0, 1]: exact for the square of a quintic's second derivative.
 constexpr std::array<double, 4> kGaussPoints = {0.06943184420297371, 0.33000947820757187,
                                                 0.66999052179242813, 0.93056815579702629};
@@ -58,10 +56,12 @@ void solve_band(const SymmetricBand& L, Eigen::MatrixXd& B) {
 }
 
 PenalisedSpline::PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd& parameters,
-                                 const Eigen::MatrixXd& values, const Eigen::VectorXd& weights)
-    : knots_(knots), breaks_(knots.breakpoints()), values_(values) {
+                                 const Eigen::MatrixXd& values, const Eigen::VectorXd& weights,
+                                 int order)
+    : order_(order), knots_(knots), breaks_(knots.breakpoints()), values_(values) {
+  EXPECTS(order == 2 || order == 3);
   EXPECTS(parameters.size() == values.rows());
-  EXPECTS(parameters.size() > kPenaltyOrder && knots.degree() > kPenaltyOrder);
+  EXPECTS(parameters.size() > order_ && knots.degree() > order_);
   basis_.resize(parameters.size(), knots.order());
   first_.resize(static_cast<std::size_t>(parameters.size()));
   int span = -1;
@@ -78,7 +78,7 @@ PenalisedSpline::PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd&
     const double width = breaks_[static_cast<std::size_t>(k) + 1] - a;
     for (int g = 0; g < points; ++g) {
       const double t = a + width * kGaussPoints[static_cast<std::size_t>(g)];
-      bending_.row(k * points + g) = basis_at(knots, t, kPenaltyOrder).values.row(kPenaltyOrder);
+      bending_.row(k * points + g) = basis_at(knots, t, order_).values.row(order_);
     }
   }
   set_weights(weights);
@@ -156,8 +156,8 @@ double PenalisedSpline::criterion(double strength, double least_noise) const {
   }
   const double least = samples * dimensions * least_noise * least_noise;
   const double log_det = 2 * L.row(0).array().log().sum();
-  return dimensions * ((samples - kPenaltyOrder) * std::log(misfit + strength * bending + least) +
-                       log_det - (count - kPenaltyOrder) * std::log(strength));
+  return dimensions * ((samples - order_) * std::log(misfit + strength * bending + least) +
+                       log_det - (count - order_) * std::log(strength));
 }
 
 namespace {

@@ -26,16 +26,16 @@ struct CondensedEnds {
   Eigen::MatrixXd right;
 };
 
-// Least squares with the penalty strength * sum over spans of stiffness * integral of |f''|^2,
-// whose minimiser is a smoothing spline when the knots are dense. The basis is evaluated once;
-// strength, weights and stiffness may change from solve to solve.
+// Least squares with the penalty strength * sum over spans of stiffness * integral of the squared
+// second (or third) derivative, whose minimiser is a smoothing spline when the knots are dense. The
+// basis is evaluated once; strength, weights and stiffness may change from solve to solve.
 class PenalisedSpline {
  public:
   // Parameters inside the knots' domain, in any order; one row of `values` and one weight >= 0 for
-  // each. Requires clamped knots, at least three samples at different parameters with positive
-  // weights.
+  // each. `order` of the penalised derivative: 2 or 3. Requires clamped knots of a higher degree,
+  // at least order + 1 samples at different parameters with positive weights.
   PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd& parameters,
-                  const Eigen::MatrixXd& values, const Eigen::VectorXd& weights);
+                  const Eigen::MatrixXd& values, const Eigen::VectorXd& weights, int order = 2);
 
   void set_weights(const Eigen::VectorXd& weights);
   void set_values(const Eigen::MatrixXd& values);
@@ -64,6 +64,7 @@ class PenalisedSpline {
   void collect_right();
   SymmetricBand system(double strength) const { return data_ + strength * penalty_; }
 
+  int order_;  // of the penalised derivative
   KnotVector knots_;
   std::vector<double> breaks_;
   Eigen::MatrixXd values_;

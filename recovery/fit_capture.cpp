@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "modeling/smooth_centerlines.h"
+#include "recovery/fit_axes.h"
 
 namespace angiospline {
 namespace {
@@ -30,7 +31,7 @@ constexpr double kNormalScale = 1.4826;   // median absolute deviation to standa
 constexpr int kFewestClear = 3;  // stations of a branch that are measured, if need be near others
 constexpr int kWideRounds = 6;
 // Voxels on either side of the wall, in each narrow round.
-constexpr std::array<double, 6> kWindows{2.0, 1.5, 1.0, 0.75, 0.75, 0.75};
+constexpr std::array<double, 6> kWindows{2.0, 1.5, 1.0, 0.75, .5, .5};
 constexpr int kNarrowRounds = static_cast<int>(kWindows.size());
 constexpr int kNeighbours = 4;   // sections on either side that moments are averaged over
 constexpr double kRimVox = 1.5;  // of an end that is not looked at
@@ -125,6 +126,7 @@ class Capture {
       tbb::parallel_for(std::size_t{0}, branches_.size(),
                         [&](std::size_t b) { narrow_round(branches_[b], round, last); });
     }
+    straighten();
     for (std::size_t b = 0; b < branches_.size(); ++b) {
       if (branches_[b].evidence >= kNoEvidence) continue;
       result.left_alone.push_back(tree_.branches[b].name);
@@ -522,6 +524,30 @@ class Capture {
     if (!last) smooth_moves(branch, 1);
     carry_frames(branch.stations);
     if (last) set_evidence(branch);
+  }
+
+  // Puts measured stations on smooth axes; the others follow.
+  void straighten() {
+    std::vector<AxisSections> sections;
+    for (const Branch& branch : branches_) {
+      const auto n = static_cast<Eigen::Index>(branch.stations.size());
+      AxisSections s{Points3(3, n), Eigen::VectorXd(n), {}, branch.stations[at(n / 2)].radius};
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const Station& station = branch.stations[at(k)];
+        s.centers_mm.col(k) = station.center;
+        s.along_mm(k) = station.along;
+        s.measured.push_back(station.clear && branch.evidence >= kNoEvidence);
+      }
+      sections.push_back(std::move(s));
+    }
+    const std::vector<Points3> smooth = smooth_axes(sections);
+    for (std::size_t b = 0; b < branches_.size(); ++b) {
+      for (std::size_t k = 0; k < branches_[b].stations.size(); ++k) {
+        if (!sections[b].measured[k]) continue;
+        branches_[b].stations[k].center = smooth[b].col(static_cast<Eigen::Index>(k));
+      }
+      follow(branches_[b]);
+    }
   }
 
   // Stations that are not measured move as the nearest measured one does.

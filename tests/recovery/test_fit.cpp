@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "base/random.h"
 #include "modeling/certificate.h"
 #include "modeling/seed_model.h"
+#include "recovery/fit_axes.h"
 #include "recovery/fit_capture.h"
 #include "recovery/fit_model.h"
 #include "recovery/fit_rings.h"
@@ -159,6 +161,32 @@ TEST(FitRings, FewerKnotsKeepEndsTangentPlanesAndTheToleranceGiven) {
   }
   EXPECT_LE(farthest, tolerance);
   EXPECT_LT(certify(fewer)->max_normal_angle_deg, 1e-6);
+}
+
+TEST(FitAxes, LeaveArcsAndStraightenNoise) {
+  // A path of constant third derivative zero (a parabola) and the same with noise.
+  const int n = 40;
+  AxisSections exact{Points3(3, n), Eigen::VectorXd(n), std::vector<char>(n, 1), 2.0};
+  Random random(5);
+  for (int k = 0; k < n; ++k) {
+    exact.along_mm(k) = 1.5 * k;
+    exact.centers_mm.col(k) = Vec3(1.4 * k, 0.01 * k * k, 3 + 0.3 * k);
+  }
+  AxisSections noisy = exact;
+  for (double& x : noisy.centers_mm.reshaped()) x += 0.2 * random.gaussian();
+  noisy.measured[20] = 0;  // far off, and known to be
+  noisy.centers_mm.col(20).array() += 5;
+  AxisSections few = noisy;
+  std::fill(few.measured.begin() + 7, few.measured.end(), char{0});
+  const auto smooth = smooth_axes({exact, noisy, few});
+  ASSERT_EQ(smooth.size(), 3U);
+  EXPECT_LT((smooth[0] - exact.centers_mm).cwiseAbs().maxCoeff(), 1e-3);
+  const auto rms = [&](const Points3& p) {
+    return std::sqrt((p - exact.centers_mm).squaredNorm() / (3.0 * n));
+  };
+  EXPECT_LT(rms(smooth[1]), 0.5 * 0.2);
+  EXPECT_LT((smooth[1].col(20) - exact.centers_mm.col(20)).norm(), 0.3);
+  EXPECT_EQ(smooth[2], few.centers_mm);  // too few to tell noise from shape
 }
 
 TEST(FitModel, PutsANoisyCylinderOnItsWall) {
