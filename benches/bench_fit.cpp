@@ -1,10 +1,13 @@
 // How near the default fit comes to analytic truths, beside marching cubes on the same images.
-//   bench_fit table [phantom ...]   every phantom at every SNR: cylinder potato bent bifurcation
-//   tree bench_fit crowded               neighbours, unequal voxels, a ramp, Rician noise: bent
-//   tube, SNR 8, 4 bench_fit starts [phantom ...]  displaced and resized starts at SNR 8 and 4
-//   bench_fit own                   bifurcation and tree from their own segmentation, SNR 8
-// ALL=1: every start, not only those that stay beyond the goal; REDUCE=x: FitOptions::reduction.
-// SEEDS=n: noise seeds (default 3); FIRST=n: the first of them (default 1); SNR=x: only this one.
+// Modes:
+//   table [phantom ...]   every phantom at every SNR: cylinder potato bent bifurcation tree
+//   crowded               neighbours, unequal voxels, a ramp, Rician noise; SNR 8 and 4
+//   starts [phantom ...]  displaced and resized starts at SNR 8 and 4
+//   own                   bifurcation and tree from their own segmentation, SNR 8
+//   local                 a throat, a bleb, a bulge: refinement where residuals are large
+// ALL=1: every start, not only those that stay beyond the goal; REDUCE=x: FitOptions::reduction;
+// FINER=n: ::refinements. SEEDS=n: noise seeds (default 3); FIRST=n: the first of them (default 1);
+// SNR=x: only this one.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -84,6 +87,7 @@ Result<Outcome> outcome(const FitPhantom& phantom, const Model& start, const Ima
   FitOptions options;
   if (std::getenv("WAVE")) options.displacement.wave_factors = {from_environment("WAVE", 1)};
   options.reduction = from_environment("REDUCE", options.reduction);
+  options.refinements = static_cast<int>(from_environment("FINER", options.refinements));
   const auto fitted = fit_model(start, image, options);
   if (!fitted) return fail(fitted.error());
   Outcome o;
@@ -313,6 +317,62 @@ void own() {
   }
 }
 
+// Small features: with and without refinement where residuals are large.
+void local() {
+  std::printf("mean (95 %%) distance in voxels near a small feature and elsewhere, three seeds\n");
+  for (const auto& [name, kind] :
+       {std::pair{"throat", LocalKind::kThroat}, std::pair{"bleb", LocalKind::kBleb},
+        std::pair{"bulge", LocalKind::kBulge}}) {
+    const LocalPhantom local = local_phantom(kind);
+    const FitPhantom& phantom = local.phantom;
+    for (const double snr : {8.0, 4.0, 2.0}) {
+      if (!wanted_snr(snr)) continue;
+      std::printf("%-7s SNR %.0f", name, snr);
+      for (const int times : {0, 3}) {
+        double near = 0, near95 = 0, far = 0, seconds = 0;
+        int points = 0;
+        bool sound = true;
+        std::string refined;
+        for (int k = 0; k < seeds(); ++k) {
+          const Image<float> image =
+              with_noise(phantom, snr, first_seed() + static_cast<std::uint64_t>(k));
+          const auto start = start_of(phantom, image);
+          FitOptions options;
+          options.refinements = times;
+          const auto before = std::chrono::steady_clock::now();
+          const auto fitted =
+              start ? fit_model(*start, image, options) : Result<FittedModel>(fail(start.error()));
+          if (!fitted) {
+            std::printf("  %s", fitted.error().message().c_str());
+            continue;
+          }
+          seconds +=
+              std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
+          const auto mesh = tessellate(fitted->model.network);
+          const auto& rims = fitted->model.network.rims;
+          const Accuracy there = accuracy(phantom, mesh->mesh, rims, local.there);
+          near += there.mean_vox / seeds();
+          near95 += there.p95_vox / seeds();
+          far += accuracy(phantom, mesh->mesh, rims, [&](const Vec3& p) { return !local.there(p); })
+                     .mean_vox /
+                 seeds();
+          points += fitted->report.control_points / seeds();
+          const auto certificate = certify(fitted->model.network);
+          sound = sound && certificate->closed && certificate->valid &&
+                  !certificate->self_intersecting && certificate->max_normal_angle_deg < 0.01;
+          for (const std::string& r : fitted->report.refined) refined = " refined " + r;
+          for (const HeldRegion& h : fitted->report.held) refined += " held " + h.name;
+        }
+        std::printf(" | %d times: near %.3f (%.3f) elsewhere %.3f, %d points, %.1f s%s%s", times,
+                    near, near95, far, points, seconds / seeds(), refined.c_str(),
+                    sound ? "" : " UNSOUND");
+        std::fflush(stdout);
+      }
+      std::printf("\n");
+    }
+  }
+}
+
 }  // namespace
 }  // namespace angiospline
 
@@ -323,4 +383,5 @@ int main(int argc, char** argv) {
   if (mode.empty() || mode == "crowded") angiospline::crowded();
   if (mode.empty() || mode == "starts") angiospline::starts(only);
   if (mode.empty() || mode == "own") angiospline::own();
+  if (mode.empty() || mode == "local") angiospline::local();
 }

@@ -40,18 +40,22 @@ double distance_to_tree(const CenterlineTree& tree, const Vec3& p) {
   return least;
 }
 
-// To first order: exact where it is zero.
-double distance_to_potato(const Vec3& p) {
-  const auto level = [](const Vec3& q) -> double {
-    const Vec3 d = q - potato_center_mm();
-    return d.norm() - potato_radius_mm(d.normalized());
-  };
+// Of the surface where `level` is zero, to first order: exact there.
+double distance_to_level(const std::function<double(const Vec3&)>& level, const Vec3& p) {
   constexpr double kStep = 1e-4;
   Vec3 slope;
   for (int i = 0; i < 3; ++i) {
     slope(i) = (level(p + kStep * Vec3::Unit(i)) - level(p - kStep * Vec3::Unit(i))) / (2 * kStep);
   }
   return level(p) / slope.norm();
+}
+
+double distance_to_potato(const Vec3& p) {
+  const auto level = [](const Vec3& q) -> double {
+    const Vec3 d = q - potato_center_mm();
+    return d.norm() - potato_radius_mm(d.normalized());
+  };
+  return distance_to_level(level, p);
 }
 
 void find_ends(FitPhantom& phantom) {
@@ -150,6 +154,61 @@ FitPhantom bent_pair() {
   return phantom;
 }
 
+LocalPhantom local_phantom(LocalKind kind) {
+  const Vec3 middle(24.2, 23.9, 30.3);
+  const double radius = kind == LocalKind::kBulge ? 11 : 6, from = 4, to = 57;
+  const auto bell = [](double squared, double deviation) {
+    return std::exp(-squared / (2 * deviation * deviation));
+  };
+  const auto level = [=](const Vec3& p) -> double {
+    const Vec3 d = p - middle;
+    if (kind == LocalKind::kBulge) {
+      const double angle = std::acos(std::clamp(d.normalized().x(), -1.0, 1.0));
+      return d.norm() - radius - 2.5 * bell(angle * angle, 10 * std::acos(-1.0) / 180);
+    }
+    const double away = std::hypot(d.x(), d.y());
+    if (kind == LocalKind::kThroat) return away - radius + 2.5 * bell(d.z() * d.z(), 2.5);
+    const double around = radius * std::atan2(d.y(), d.x());
+    return away - radius - 2 * bell(around * around + d.z() * d.z(), 2);
+  };
+  LocalPhantom local;
+  FitPhantom& phantom = local.phantom;
+  ImageGrid grid;
+  grid.size = {48, 48, 62};
+  Shape shape{level, Vec3::Zero(), Vec3(47, 47, 61), 2.5};
+  if (kind != LocalKind::kBulge) {
+    shape.inside = [=](const Vec3& p) {
+      return std::max(level(p), std::max(from - p.z(), p.z() - to));
+    };
+    CenterlineBranch axis;
+    axis.name = "vessel";
+    axis.from = 0;
+    axis.to = 1;
+    axis.points_mm.resize(3, 2);
+    axis.points_mm << middle.x(), middle.x(), middle.y(), middle.y(), from, to;
+    axis.radii_mm = Vec2::Constant(radius);
+    phantom.tree.nodes = {{"bottom", axis.points_mm.col(0)}, {"top", axis.points_mm.col(1)}};
+    phantom.tree.inlets = {0};
+    phantom.tree.branches = {axis};
+    find_ends(phantom);
+  }
+  const Image<float> share = coverage(grid, {shape});
+  phantom.clean = Image<float>(grid);
+  phantom.truth = Mask(grid);
+  for (std::size_t i = 0; i < share.voxels.size(); ++i) {
+    phantom.clean.voxels[i] = static_cast<float>(grey(share.voxels[i]));
+    phantom.truth.voxels[i] = share.voxels[i] >= 0.5F;
+  }
+  phantom.distance = [level](const Vec3& p) { return distance_to_level(level, p); };
+  local.there = [=](const Vec3& p) {
+    const Vec3 d = p - middle;
+    if (kind == LocalKind::kBulge) return d.normalized().x() > 0.9;  // 26 degrees
+    if (kind == LocalKind::kThroat) return std::abs(d.z()) < 6;
+    return std::abs(d.z()) < 4 && std::abs(radius * std::atan2(d.y(), d.x())) < 4;
+  };
+  return local;
+}
+
 Image<float> with_noise(const FitPhantom& phantom, double snr, std::uint64_t seed) {
   Image<float> image = phantom.clean;
   if (snr <= 0) return image;
@@ -182,8 +241,8 @@ Image<float> with_ramp(const FitPhantom& phantom, double snr, std::uint64_t seed
   return with_noise(ramped, snr, seed);
 }
 
-Accuracy accuracy(const FitPhantom& phantom, const TriangleMesh& mesh,
-                  const std::vector<Rim>& rims) {
+Accuracy accuracy(const FitPhantom& phantom, const TriangleMesh& mesh, const std::vector<Rim>& rims,
+                  const std::function<bool(const Vec3&)>& where) {
   std::vector<double> distance(at(mesh.points_mm.cols()));
   for (std::size_t i = 0; i < distance.size(); ++i) {
     distance[i] = phantom.distance(mesh.points_mm.col(static_cast<Eigen::Index>(i)));
@@ -197,6 +256,7 @@ Accuracy accuracy(const FitPhantom& phantom, const TriangleMesh& mesh,
                d = mesh.points_mm.col(c(2));
     const Vec3 middle = (a + b + d) / 3;
     if (at_an_end(phantom, middle) || at_a_rim(phantom, rims, middle)) continue;
+    if (where && !where(middle)) continue;
     const double weight = (b - a).cross(d - a).norm() / 2;
     double size = 0, offset = 0;
     for (const int p : c) {

@@ -24,6 +24,16 @@ struct FitPhantom {
   double voxel_mm = 1.0;
 };
 
+// A wall with something small on it: a tube of radius 6 with a narrow throat (radius 3.5, deviation
+// 2.5 along it), the same with a bleb (2 high, deviation 2), a ball of radius 11 with a bulge (2.5
+// high, deviation 10 degrees). `there` tells the neighbourhood of it.
+enum class LocalKind { kThroat, kBleb, kBulge };
+struct LocalPhantom {
+  FitPhantom phantom;
+  std::function<bool(const Vec3&)> there;
+};
+LocalPhantom local_phantom(LocalKind kind);
+
 inline constexpr double kBackground = 200, kContrast = 1000;
 
 // The phantoms of recovery/phantom.h; spacing in mm. The tree has 21 branches in 144 mm, seed 3.
@@ -45,9 +55,10 @@ struct Accuracy {
 };
 
 // Over the wall's area; what lies within two voxels of an open end of the phantom, or beyond it, or
-// of one of these rims, is left out.
+// of one of these rims, is left out, and what is not `where`.
 Accuracy accuracy(const FitPhantom& phantom, const TriangleMesh& mesh,
-                  const std::vector<Rim>& rims = {});
+                  const std::vector<Rim>& rims = {},
+                  const std::function<bool(const Vec3&)>& where = {});
 
 // The thesis's figure over the voxels that are not within two voxels of an open end or beyond it.
 double missed_percent(const FitPhantom& phantom, const TriangleMesh& mesh);

@@ -104,6 +104,7 @@ Json report_json(const FitReport& report) {
           {"mean_move_mm", report.mean_move_mm},
           {"without_edge", report.without_edge},
           {"recaptured", report.recaptured},
+          {"refined", report.refined},
           {"held", held}};
 }
 

@@ -21,6 +21,10 @@ SurfaceNetwork closed_surface(const Vec3& center_mm, const Mat3& half_axes_mm,
 // with whole sides and nothing else. By region; empty for all others.
 std::vector<std::vector<int>> closed_patches(const SurfaceNetwork& network);
 
+// The same surfaces with each of these patches cut in four at the middle of its parameters.
+// Requires all patches of closed surfaces, or none. The first quarter keeps the patch's number.
+SurfaceNetwork with_quartered(const SurfaceNetwork& network, const std::vector<int>& patches);
+
 // Of a piece of a mask that becomes a closed surface.
 inline constexpr int kFewestClosedVoxels = 30;
 

@@ -12,8 +12,7 @@
 namespace angiospline {
 namespace {
 
-constexpr double kLevelMean = 3.0;   // radii over which the wall is averaged for the levels
-constexpr double kNodeNoise = 0.65;  // of a voxel's noise left by interpolation across a profile
+constexpr double kLevelMean = 3.0;       // radii over which the wall is averaged for the levels
 constexpr double kLeastContrast = 0.25;  // of the median: less is no wall
 constexpr double kWaveVox = 32.0;        // L of SNR 1
 constexpr double kWaveExponent = -0.4;
@@ -144,12 +143,7 @@ Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, Mesh
     Eigen::VectorXd smooth = smoother.fair(wanted, weights, result.wave_factor * waves);
     if (last && !progress.should_stop()) {
       weigh_outliers(wanted - smooth, offsets.weight, 0.1 * field.voxel_mm(), weights);
-      const double relative = 1 / result.greys.snr();
-      // Nodes farther apart than voxels see only part of the image.
-      const double area =
-          std::max(field.voxel_mm() * field.voxel_mm(), kNodeNoise * smoother.mass_mm2().mean());
-      const double density =
-          relative * relative * 2 * half * area * field.voxel_mm() * field.voxel_mm();
+      const double density = result.greys.noise_density(field, half, smoother);
       choose_wave(smoother, wanted, weights, waves, density, options.wave_factors, progress,
                   result);
       smooth = smoother.fair(wanted, weights, result.wave_factor * waves);

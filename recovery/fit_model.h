@@ -20,6 +20,9 @@ struct FitOptions {
   bool dark = false;        // vessels are darker than their background
   int rounds = 1;           // of free-form refinement of the surface
   double body_spans = 1.0;  // length of a body's spans, in radii, while it is fitted
+  // Times that bodies and closed surfaces get more freedom where their residual is larger than
+  // noise explains, and are fitted there again (recovery/fit_refinement.h).
+  int refinements = 3;
   // What data reduction may move a body's wall by afterwards, in voxels over SNR: about half of
   // what noise leaves. 0: no reduction.
   double reduction = 0.15;
@@ -44,6 +47,7 @@ struct FitReport {
   std::vector<std::string> without_edge;  // regions near which the image shows no wall: as seeded
   std::vector<std::string> recaptured;  // branches that lay beside their vessel and were led there
   std::vector<HeldRegion> held;         // regions that would have folded: as seeded
+  std::vector<std::string> refined;     // regions that got more knots where residuals were large
 };
 
 struct FittedModel {

@@ -1,6 +1,7 @@
 #include "recovery/fit_network.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <map>
@@ -20,7 +21,8 @@ namespace angiospline {
 namespace {
 
 constexpr int kPerPatch = 5;
-constexpr double kRidge = 1e-7;  // of the mean diagonal: spans without nodes stay as they are
+constexpr double kRidge = 1e-7;     // of the mean diagonal: spans without nodes stay as they are
+constexpr double kFairness = 3e-4;  // of the mean diagonal, on second differences of rows
 constexpr double kLeastJacobian = 0.3;  // of a body, relative to what it was
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -191,10 +193,28 @@ class Mover {
       for (const StripRing& ring : of_junction) {
         patches.insert(patches.end(), ring.patches.begin(), ring.patches.end());
       }
-      moved[k] = move_junction(old_, of_junction, openings, samples_on(patches));
+      if (any_moves(of_junction, patches, openings)) {
+        moved[k] = move_junction(old_, of_junction, openings, samples_on(patches));
+      }
       progress.at("junctions", static_cast<double>(++done) / static_cast<double>(regions.size()));
     });
     for (std::size_t k = 0; k < regions.size(); ++k) take(moved[k], regions[k], result);
+  }
+
+  // Whether anything of a junction is to move: its openings, or nodes on its patches.
+  bool any_moves(const std::vector<StripRing>& rings, const std::vector<int>& patches,
+                 const std::map<int, Vec3>& openings) const {
+    for (const StripRing& ring : rings) {
+      for (int c = 0; c < ring.points(); ++c) {
+        const auto found = openings.find(ring.columns(0, c));
+        if (found == openings.end()) continue;
+        if (found->second != old_.control_points_mm.col(found->first)) return true;
+      }
+    }
+    return std::any_of(patches.begin(), patches.end(), [&](int p) {
+      const std::vector<int>& nodes = nodes_of_[at(p)];
+      return std::any_of(nodes.begin(), nodes.end(), [&](int k) { return displacement_(k) != 0; });
+    });
   }
 
   void move_closed_regions(MovedNetwork& result, const Progress& progress) const {
@@ -394,12 +414,45 @@ class Mover {
         }
       }
     }
+    add_fairness(ring, first, last, basis, moves, A, b);
     A.row(0).array() += kRidge * A.row(0).mean() + 1e-300;
     if (!factorise_band(A)) return;
     solve_band(A, b);
     for (int i = first; i <= last; ++i) {
       moves.middleCols(i * ring.points(), ring.points()) =
           (basis * b.middleRows(d * (i - first), d)).transpose();
+    }
+  }
+
+  // Second differences of the moves from row to row: where spans have hardly more nodes than rows,
+  // nothing else keeps rows from swinging.
+  static void add_fairness(const StripRing& ring, int first, int last, const Eigen::MatrixXd& basis,
+                           const Points3& moves, SymmetricBand& A, Eigen::MatrixXd& b) {
+    const Eigen::Index d = basis.cols();
+    const double weight = kFairness * A.row(0).mean();
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> to_numbers(basis);
+    const auto given = [&](int row) -> Eigen::MatrixXd {
+      return to_numbers.solve(
+          moves.middleCols(row * ring.points(), ring.points()).transpose().eval());
+    };
+    constexpr std::array<double, 3> kDifference{1, -2, 1};
+    for (int middle = std::max(1, first - 1); middle <= std::min(ring.rows() - 2, last + 1);
+         ++middle) {
+      Eigen::MatrixXd known = Eigen::MatrixXd::Zero(d, 3);
+      for (int k = 0; k < 3; ++k) {
+        const int row = middle - 1 + k;
+        if (row < first || row > last) known += kDifference[at(k)] * given(row);
+      }
+      for (int k = 0; k < 3; ++k) {
+        const int row = middle - 1 + k;
+        if (row < first || row > last) continue;
+        b.middleRows(d * (row - first), d) -= weight * kDifference[at(k)] * known;
+        for (int l = k; l < 3; ++l) {
+          if (middle - 1 + l > last) continue;
+          A.row(d * (l - k)).segment(d * (row - first), d).array() +=
+              weight * kDifference[at(k)] * kDifference[at(l)];
+        }
+      }
     }
   }
 

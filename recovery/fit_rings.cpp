@@ -150,31 +150,6 @@ std::vector<double> finer_knots(const SurfaceNetwork& network, const StripRing& 
   return added;
 }
 
-// Drops the columns that nothing uses any more.
-void compact(SurfaceNetwork& network) {
-  std::vector<int> number(at(network.control_points_mm.cols()), -1);
-  int count = 0;
-  const auto use = [&](int& column) {
-    int& n = number[at(column)];
-    if (n < 0) n = count++;
-    column = n;
-  };
-  for (Patch& patch : network.patches) {
-    for (int& c : patch.control) use(c);
-  }
-  for (Dependency& d : network.dependencies) {
-    use(d.point);
-    for (auto& [master, weight] : d.masters) use(master);
-  }
-  Points3 kept(3, count);
-  for (std::size_t c = 0; c < number.size(); ++c) {
-    if (number[c] >= 0) {
-      kept.col(number[c]) = network.control_points_mm.col(static_cast<Eigen::Index>(c));
-    }
-  }
-  network.control_points_mm = std::move(kept);
-}
-
 // Gives the ring's patches these knots and rows of columns.
 void set_rows(SurfaceNetwork& network, const StripRing& ring, const KnotVector& u,
               const Eigen::MatrixXi& columns) {
@@ -418,6 +393,31 @@ std::optional<ReducedRing> reduced_ring(const SurfaceNetwork& network, const Str
 
 }  // namespace
 
+SurfaceNetwork compacted(SurfaceNetwork network) {
+  std::vector<int> number(at(network.control_points_mm.cols()), -1);
+  int count = 0;
+  const auto use = [&](int& column) {
+    int& n = number[at(column)];
+    if (n < 0) n = count++;
+    column = n;
+  };
+  for (Patch& patch : network.patches) {
+    for (int& c : patch.control) use(c);
+  }
+  for (Dependency& d : network.dependencies) {
+    use(d.point);
+    for (auto& [master, weight] : d.masters) use(master);
+  }
+  Points3 kept(3, count);
+  for (std::size_t c = 0; c < number.size(); ++c) {
+    if (number[c] >= 0) {
+      kept.col(number[c]) = network.control_points_mm.col(static_cast<Eigen::Index>(c));
+    }
+  }
+  network.control_points_mm = std::move(kept);
+  return network;
+}
+
 SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_mm) {
   EXPECTS(tolerance_mm > 0);
   SurfaceNetwork fewer = network;
@@ -451,21 +451,22 @@ SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_
   }
   fewer.control_points_mm =
       Eigen::Map<const Points3>(pool.data()->data(), 3, static_cast<Eigen::Index>(pool.size()));
-  compact(fewer);
-  return fewer;
+  return compacted(std::move(fewer));
 }
 
-SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii) {
+SurfaceNetwork with_knots_added(const SurfaceNetwork& network, const std::vector<StripRing>& rings,
+                                const std::vector<std::vector<double>>& added) {
+  EXPECTS(added.size() == rings.size());
   SurfaceNetwork finer = network;
   std::vector<Vec3> pool;
   for (Eigen::Index c = 0; c < network.control_points_mm.cols(); ++c) {
     pool.push_back(network.control_points_mm.col(c));
   }
-  for (const StripRing& ring : strip_rings(network)) {
-    if (network.regions[at(ring.region)].kind != RegionKind::kBody) continue;
-    const std::vector<double> added = finer_knots(network, ring, radii);
-    if (added.empty()) continue;
-    const KnotVector u = with_knots(ring.u, added).value();
+  for (std::size_t r = 0; r < rings.size(); ++r) {
+    if (added[r].empty()) continue;
+    const StripRing& ring = rings[r];
+    EXPECTS(network.regions[at(ring.region)].kind == RegionKind::kBody);
+    const KnotVector u = with_knots(ring.u, added[r]).value();
     const int rows = u.control_point_count();
     Eigen::MatrixXi columns(rows, ring.points());
     columns.row(0) = ring.columns.row(0);
@@ -484,8 +485,17 @@ SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii) {
   }
   finer.control_points_mm =
       Eigen::Map<const Points3>(pool.data()->data(), 3, static_cast<Eigen::Index>(pool.size()));
-  compact(finer);
-  return finer;
+  return compacted(std::move(finer));
+}
+
+SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii) {
+  const std::vector<StripRing> rings = strip_rings(network);
+  std::vector<std::vector<double>> added;
+  for (const StripRing& ring : rings) {
+    const bool body = network.regions[at(ring.region)].kind == RegionKind::kBody;
+    added.push_back(body ? finer_knots(network, ring, radii) : std::vector<double>());
+  }
+  return with_knots_added(network, rings, added);
 }
 
 }  // namespace angiospline

@@ -32,9 +32,17 @@ struct StripRing {
 // Bezier in v, or do not close into a ring, are in none.
 std::vector<StripRing> strip_rings(const SurfaceNetwork& network);
 
+// Without the pool columns that nothing uses; the others in the order of their use.
+SurfaceNetwork compacted(SurfaceNetwork network);
+
 // The same surfaces with knots added to the bodies by bisection until no span is longer than
 // `radii` of its ring (mean distance from its centre). Pool columns are numbered anew.
 SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii);
+
+// The same surfaces with more knots along u: `added[r]` for ring r of strip_rings(network), within
+// its knots' domain. Only bodies may have any. Pool columns are numbered anew.
+SurfaceNetwork with_knots_added(const SurfaceNetwork& network, const std::vector<StripRing>& rings,
+                                const std::vector<std::vector<double>>& added);
 
 // Bodies over the length of their axes, cut across it and fitted anew with the fewest equal spans
 // that leave every place of them within the tolerance along the normal; one that would take as many

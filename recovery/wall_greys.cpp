@@ -18,8 +18,9 @@ constexpr double kNoiseRise = 4.0;       // standard deviations of noise that ar
 constexpr double kOutsideWave = 5.0;     // radii over which the background may vary
 constexpr double kInsideMean = 8.0;      // radii over which the inside is averaged
 constexpr int kLevelRounds = 2;          // the second without the first one's outliers
-constexpr double kOutlier = 3.0;         // standard deviations from which a value counts less
-constexpr double kBend = 0.9;  // of the way to a centre of curvature that counts as inside
+constexpr double kNodeNoise = 0.65;  // of a voxel's noise left by interpolation across a profile
+constexpr double kOutlier = 3.0;     // standard deviations from which a value counts less
+constexpr double kBend = 0.9;        // of the way to a centre of curvature that counts as inside
 constexpr double kNoiseFrom = 1.6, kNoiseTo = 4.6;  // widths from the wall: voxels that show noise
 constexpr double kNormalScale = 1.4826;    // median absolute deviation to standard deviation
 constexpr std::size_t kFewestInside = 50;  // voxels: fewer say less about noise than the outside
@@ -226,6 +227,14 @@ void weigh_outliers(const Eigen::VectorXd& residual, const Eigen::VectorXd& base
 
 double WallGreys::snr() const {
   return noise * kBestSnr > std::abs(contrast) ? std::abs(contrast) / noise : kBestSnr;
+}
+
+double WallGreys::noise_density(const GreyField& field, double half_window_vox,
+                                const MeshSmoother& smoother) const {
+  const double voxel = field.voxel_mm();
+  // Nodes farther apart than voxels see only part of the image.
+  const double area = std::max(voxel * voxel, kNodeNoise * smoother.mass_mm2().mean());
+  return 2 * half_window_vox * voxel * voxel * area / (snr() * snr());
 }
 
 WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,

@@ -14,6 +14,11 @@ struct WallGreys {
   double noise = 0.0;     // standard deviation of a voxel; of Rician noise, that of its two parts
   NoiseKind kind = NoiseKind::kWhite;
   double snr() const;  // contrast over noise, at most 20
+
+  // Variance of a profile's sum of this half window, times the area over which sums are alike
+  // (mm^4): what the mean over an area A still varies by is this over A.
+  double noise_density(const GreyField& field, double half_window_vox,
+                       const MeshSmoother& smoother) const;
 };
 
 // Robust and local: means of what lies one to three voxels from the wall, smooth over some five

@@ -1,0 +1,45 @@
+// Where a fitted wall still is too far from the image's, and a network with more freedom there.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "recovery/fit_displacement.h"
+
+namespace angiospline {
+
+struct ResidualOptions {
+  double mean_vox = 1.5;    // how far around a node residuals are averaged
+  double deviations = 5.0;  // of what noise leaves of such a mean: more is no noise
+  double least_vox = 0.1;   // and at least so far from the wall
+  double half_window_vox = 0.75;
+};
+
+// Nodes of bodies and closed surfaces whose wall lies significantly elsewhere.
+struct LargeResiduals {
+  Eigen::VectorXd mean_mm;    // residual along the normal, averaged
+  std::vector<char> large;    // of each node
+  std::vector<char> regions;  // of the network: has any
+  Eigen::VectorXd share;      // 1 where large, falling to 0 over half a radius around
+
+  bool any() const;
+};
+
+// Measures the wall from where the mesh is. Regions with `excluded` set are not looked at, nor are
+// junctions, whose patches get no more freedom.
+LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& network,
+                               const FitMesh& mesh, MeshSmoother& smoother,
+                               const std::vector<char>& excluded,
+                               const ResidualOptions& options = {});
+
+// More freedom where residuals are large: spans of bodies are halved, down to `shortest_mm`;
+// closed surfaces get four patches for each, unless patches would be shorter than four times that.
+// The surfaces are the same; patches keep their numbers. The names of the regions that got any.
+struct RefinedNetwork {
+  SurfaceNetwork network;
+  std::vector<std::string> regions;
+};
+RefinedNetwork refined_where_large(const SurfaceNetwork& network, const FitMesh& mesh,
+                                   const LargeResiduals& residuals, double shortest_mm);
+
+}  // namespace angiospline
