@@ -21,8 +21,10 @@ namespace angiospline {
 namespace {
 
 constexpr int kPerPatch = 5;
-constexpr double kRidge = 1e-7;     // of the mean diagonal: spans without nodes stay as they are
-constexpr double kFairness = 3e-4;  // of the mean diagonal, on second differences of rows
+constexpr double kRidge = 1e-7;  // of the mean diagonal: spans without nodes stay as they are
+// Of the mean diagonal, on second differences of a body's rows: the first that does not fold.
+constexpr std::array<double, 4> kFairness{3e-4, 3e-3, 0.03, 0.3};
+constexpr double kLeastShare = 0.125;   // of a body's way
 constexpr double kLeastJacobian = 0.3;  // of a body, relative to what it was
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
@@ -66,8 +68,8 @@ Points3 fit_ring(const StripRing& ring, const std::vector<RingSample>& samples) 
 
 // A body between rows that are given.
 struct BodyFit {
-  Points3 points;  // row by row
-  bool folded = false;
+  Points3 points;      // row by row
+  double share = 1.0;  // of the way that it could go without folding
 };
 
 class Mover {
@@ -323,9 +325,12 @@ class Mover {
               fits[r].points.col(i * ring.points() + c);
         }
       }
-      if (fits[r].folded) {
-        result.held.push_back({old_.regions[at(ring.region)].name, "its wall would fold"});
-      }
+      if (fits[r].share >= 1) continue;
+      const std::string why =
+          fits[r].share > 0
+              ? fmt::format("beyond {:.3g} % of the way: its wall would fold", 100 * fits[r].share)
+              : "its wall would fold";
+      result.held.push_back({old_.regions[at(ring.region)].name, why});
     }
   }
 
@@ -348,18 +353,28 @@ class Mover {
     for (int i = 0; i < first; ++i) moves.middleCols(i * n, n) = start;
     for (int i = last + 1; i < rows; ++i) moves.middleCols(i * n, n) = end;
     BodyFit fit;
-    if (last >= first) solve_rows(ring, first, last, moves);
-    fit.points = old_net(ring) + moves;
-    if (folded(ring, fit.points)) {
-      // Only the ends move; their moves die out over the rows between.
-      for (int i = first; i <= last; ++i) {
-        const double w = static_cast<double>(i) / (rows - 1);
-        const double fade_start = std::max(0.0, 1 - 3 * w), fade_end = std::max(0.0, 3 * w - 2);
-        moves.middleCols(i * n, n) = fade_start * start + fade_end * end;
-      }
+    const Points3 given = moves;
+    const auto attempt = [&](double share, double fairness) {
+      moves = given;
+      if (last >= first) solve_rows(ring, first, last, share, fairness, moves);
       fit.points = old_net(ring) + moves;
-      fit.folded = true;
+      fit.share = share;
+      return !folded(ring, fit.points);
+    };
+    for (const double fairness : kFairness) {
+      if (attempt(1.0, fairness)) return fit;
     }
+    for (double share = 0.5; share >= kLeastShare; share /= 2) {
+      if (attempt(share, kFairness.back())) return fit;
+    }
+    // Only the ends move; their moves die out over the rows between.
+    for (int i = first; i <= last; ++i) {
+      const double w = static_cast<double>(i) / (rows - 1);
+      const double fade_start = std::max(0.0, 1 - 3 * w), fade_end = std::max(0.0, 3 * w - 2);
+      moves.middleCols(i * n, n) = fade_start * start + fade_end * end;
+    }
+    fit.points = old_net(ring) + moves;
+    fit.share = 0.0;
     return fit;
   }
 
@@ -375,7 +390,8 @@ class Mover {
 
   // Least squares over rows first .. last, all other rows of `moves` given. Banded: rows of the net
   // are six apart at most.
-  void solve_rows(const StripRing& ring, int first, int last, Points3& moves) const {
+  void solve_rows(const StripRing& ring, int first, int last, double share, double fairness,
+                  Points3& moves) const {
     const Eigen::MatrixXd basis = ring.basis();
     const Eigen::Index d = basis.cols();
     const Eigen::Index size = d * (last - first + 1);
@@ -388,7 +404,7 @@ class Mover {
         const auto [c0, bv] =
             ring_functions(static_cast<double>(k) + uv.y(), static_cast<int>(ring.patches.size()));
         const Eigen::VectorXd around = ring_row(ring, basis, static_cast<double>(k) + uv.y());
-        Vec3 value = move_of(node);
+        Vec3 value = share * move_of(node);
         Eigen::VectorXd row = Eigen::VectorXd::Zero(6 * d);
         Eigen::Index from = -1;
         int parts = 0;
@@ -414,7 +430,7 @@ class Mover {
         }
       }
     }
-    add_fairness(ring, first, last, basis, moves, A, b);
+    add_fairness(ring, first, last, basis, fairness, moves, A, b);
     A.row(0).array() += kRidge * A.row(0).mean() + 1e-300;
     if (!factorise_band(A)) return;
     solve_band(A, b);
@@ -427,9 +443,10 @@ class Mover {
   // Second differences of the moves from row to row: where spans have hardly more nodes than rows,
   // nothing else keeps rows from swinging.
   static void add_fairness(const StripRing& ring, int first, int last, const Eigen::MatrixXd& basis,
-                           const Points3& moves, SymmetricBand& A, Eigen::MatrixXd& b) {
+                           double fairness, const Points3& moves, SymmetricBand& A,
+                           Eigen::MatrixXd& b) {
     const Eigen::Index d = basis.cols();
-    const double weight = kFairness * A.row(0).mean();
+    const double weight = fairness * A.row(0).mean();
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> to_numbers(basis);
     const auto given = [&](int row) -> Eigen::MatrixXd {
       return to_numbers.solve(

@@ -27,8 +27,9 @@ struct MovedNetwork {
 //      (recovery/fit_junction.h); one that fails a gate goes as far as it can, with its openings,
 //      and is named.
 //   3. Each body is fitted between the rows so given; at an opening the row next to it keeps its
-//      distance from it, at a rim the end row stays in its plane. A body that would fold keeps its
-//      shape but for its ends, and is named.
+//      distance from it, at a rim the end row stays in its plane. A body that would fold is tried
+//      with stiffer moves, then over parts of the way; at last it keeps its shape but for its
+//      ends. If it did not go the whole way it is named.
 // Parallel over junctions and bodies, the same on any number of threads. Errors: stopped on
 // request.
 Result<MovedNetwork> move_network(const SurfaceNetwork& network, const FitMesh& mesh,

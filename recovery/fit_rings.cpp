@@ -337,7 +337,7 @@ struct ReducedRing {
 std::optional<ReducedRing> reduced_ring(const SurfaceNetwork& network, const StripRing& ring,
                                         double tolerance_mm) {
   constexpr int kSections = 4;        // for each row of the ring
-  constexpr double kLeastStep = 0.5;  // of the steps between sections
+  constexpr double kLeastStep = 0.7;  // of the steps between sections
   const CrossSections sections(network, ring);
   if (!sections.has_axis()) return {};
   std::vector<double> places;
@@ -377,7 +377,7 @@ std::optional<ReducedRing> reduced_ring(const SurfaceNetwork& network, const Str
     for (std::size_t k = 0; k < cuts.size() && solved; ++k) {
       farthest = std::max(farthest, sections.distance_mm(cuts[k], trial[k]));
     }
-    // Steps along every line keep half of what they were: nothing comes near to folding.
+    // Steps along every line keep most of what they were: nothing comes near to folding.
     bool sound = solved;
     for (std::size_t k = 0; k + 1 < cuts.size() && sound; ++k) {
       for (int c = 0; c < n && sound; ++c) {
