@@ -20,6 +20,7 @@ constexpr double kEvidence = 0.25;  // of the contrast across a region's wall: l
 constexpr std::array<double, 2> kCaptureWindows{0.4, 0.2};  // of a closed surface, in its radii
 constexpr int kClosedRounds = 2;
 constexpr double kRefinedRimVox = 4.0;    // of an end: what an end does to a wall is no residual
+constexpr double kProgress = 0.7;         // of large residuals left, for another round
 constexpr double kShortestSpanVox = 1.0;  // of a body, where residuals are large
 constexpr double kLeastCovered = 0.5;     // of the nodes: fewer in the image, and the frames differ
 
@@ -148,10 +149,12 @@ class Fitter {
   }
 
   // Looks where residuals are larger than noise explains; halves spans there, and fits there again
-  // with waves half as long as the time before. A region that would fold is left as it was before.
+  // with waves half as long as the time before. A region that would fold is left as it was before;
+  // one whose residuals hardly fall is left where it has come to.
   Result<void> fit_again_where_large(SurfaceNetwork& network, FitReport& report) {
     std::vector<char> excluded = untouched(network, report);
     const SurfaceNetwork before = network;
+    std::vector<double> amounts(network.regions.size(), std::numeric_limits<double>::infinity());
     FitMeshOptions spacing;
     spacing.voxel_mm = field_.voxel_mm();
     spacing.rim_margin_vox = kRefinedRimVox;
@@ -164,6 +167,7 @@ class Fitter {
       MeshSmoother smoother(*coarse);
       const LargeResiduals large = large_residuals(field_, network, *coarse, smoother, excluded);
       if (!large.any()) break;
+      if (exclude_stuck(large, amounts, excluded)) continue;
       const RefinedNetwork finer =
           refined_where_large(network, *coarse, large, kShortestSpanVox * field_.voxel_mm());
       const auto mesh = make_fit_mesh(finer.network, spacing, progress_);
@@ -182,6 +186,7 @@ class Fitter {
         if (std::find(known.begin(), known.end(), name) == known.end()) known.push_back(name);
       }
       ++round;
+      amounts = large.amounts_mm3;
       local.wave_factors.front() /= 2;
     }
     if (!report.refined.empty()) keep_if_sound(before, network, report);
@@ -199,6 +204,19 @@ class Fitter {
           {name, "with more knots where its residual is large it crosses itself"});
     }
     report.refined.clear();
+  }
+
+  // Excludes the regions whose large residuals the round before did not make smaller.
+  static bool exclude_stuck(const LargeResiduals& large, const std::vector<double>& before,
+                            std::vector<char>& excluded) {
+    bool any = false;
+    for (std::size_t r = 0; r < excluded.size(); ++r) {
+      if (excluded[r] || !large.regions[r] || before[r] == 0) continue;
+      if (large.amounts_mm3[r] < kProgress * before[r]) continue;
+      excluded[r] = 1;
+      any = true;
+    }
+    return any;
   }
 
   // Excludes the regions that were to move and could not; whether there are any.

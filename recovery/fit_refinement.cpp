@@ -72,6 +72,7 @@ LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& net
   found.mean_mm = smoother.mean(wall.normal_mm + wall.residual_mm, wall.weight, reach);
   found.large.assign(mesh.nodes.size(), 0);
   found.regions.assign(network.regions.size(), 0);
+  found.amounts_mm3.assign(network.regions.size(), 0.0);
   // Of (1 - l^2 Laplacian)^-1 white noise of density S keeps the variance S / (4 pi l^2).
   const double noise = wall.greys.noise_density(field, options.half_window_vox, smoother);
   const double deviation = std::sqrt(noise / (4 * std::numbers::pi)) / reach;
@@ -84,6 +85,7 @@ LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& net
     if (!refinable || excluded[r] || !(wall.weight(k) > 0)) continue;
     if (!(std::abs(found.mean_mm(k)) > least)) continue;
     found.large[at(k)] = found.regions[r] = 1;
+    found.amounts_mm3[r] += std::abs(found.mean_mm(k)) * smoother.mass_mm2()(k);
     marks(k) = 1;
   }
   found.share = Eigen::VectorXd::Zero(n);

@@ -17,10 +17,11 @@ struct ResidualOptions {
 
 // Nodes of bodies and closed surfaces whose wall lies significantly elsewhere.
 struct LargeResiduals {
-  Eigen::VectorXd mean_mm;    // residual along the normal, averaged
-  std::vector<char> large;    // of each node
-  std::vector<char> regions;  // of the network: has any
-  Eigen::VectorXd share;      // 1 where large, falling to 0 over half a radius around
+  Eigen::VectorXd mean_mm;          // residual along the normal, averaged
+  std::vector<char> large;          // of each node
+  std::vector<char> regions;        // of the network: has any
+  std::vector<double> amounts_mm3;  // of each region: their sizes times their areas
+  Eigen::VectorXd share;            // 1 where large, falling to 0 over half a radius around
 
   bool any() const;
 };
