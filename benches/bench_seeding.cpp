@@ -251,7 +251,7 @@ std::vector<std::string> parts(const std::string& text) {
   std::size_t from = 0;
   while (from < text.size()) {
     const std::size_t comma = std::min(text.find(',', from), text.size());
-    list.push_back("." + text.substr(from, comma - from));
+    list.push_back(fmt::format(".{}", text.substr(from, comma - from)));
     from = comma + 1;
   }
   return list;
