@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "base/median.h"
 #include "modeling/branch_smoother.h"
 #include "modeling/clean_tree.h"
 #include "modeling/overlaps.h"
@@ -27,12 +28,6 @@ constexpr double kInsideLimit = 0.99;  // of the largest move, for nodes: below 
 
 constexpr std::size_t kNamedOverlaps = 50;  // pairs that are warned of by name
 constexpr double kWorthNaming = 0.95;       // of its radius that a branch keeps in its bends
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // The radius of the thickest and of the thinnest branch at each node, just beside it.
 struct NodeRadii {

@@ -11,6 +11,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "base/median.h"
 #include "recovery/axis_smoothing.h"
 #include "recovery/distance_transform.h"
 #include "recovery/lumen_section.h"
@@ -39,13 +40,6 @@ struct Points {
   Eigen::VectorXd counted;             // the same by counting voxels, over radius_mm; 0: not known
   std::vector<bool> in_junction;       // within a junction's lumen, where sections mean nothing
 };
-
-double median(std::vector<double> values) {
-  EXPECTS(!values.empty());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 class Centerlines {
  public:

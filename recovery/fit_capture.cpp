@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
+#include "base/median.h"
 #include "modeling/smooth_centerlines.h"
 #include "recovery/fit_axes.h"
 
@@ -37,13 +38,6 @@ constexpr int kNeighbours = 4;   // sections on either side that moments are ave
 constexpr double kRimVox = 1.5;  // of an end that is not looked at
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // A cross-section. Its frame is carried along the branch without turning.
 struct Station {

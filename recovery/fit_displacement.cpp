@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/contract.h"
+#include "base/median.h"
 
 namespace angiospline {
 namespace {
@@ -19,13 +20,6 @@ constexpr double kWaveExponent = -0.4;
 constexpr double kWaveRadii = 2.5;  // the longest L of factor one
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // One round's measurements.
 struct Offsets {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/median.h"
 #include "recovery/closed_surface.h"
 #include "recovery/fit_rings.h"
 
@@ -17,12 +18,6 @@ constexpr double kPatchSpans = 4.0;       // a closed surface's patch is worth s
 constexpr std::size_t kMostPatches = 24;  // of one closed surface
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Length of each span of a ring along its patches' middle lines, the longest of the patches.
 std::vector<double> span_lengths(const SurfaceNetwork& network, const StripRing& ring) {

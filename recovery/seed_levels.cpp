@@ -5,18 +5,12 @@
 #include <numbers>
 #include <numeric>
 
+#include "base/median.h"
 #include "recovery/gaussian.h"
 #include "recovery/morphology.h"
 
 namespace angiospline::segmentation {
 namespace {
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // A cube around a voxel, vessels bright, not-finite voxels left out of the values.
 struct Cube {

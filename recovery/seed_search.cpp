@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "base/median.h"
 #include "recovery/morphology.h"
 #include "recovery/vesselness.h"
 
@@ -25,12 +26,6 @@ bool near_border(const ImageGrid& grid, const Voxel& v, int reach, int thin) {
   for (std::size_t k = 0; k < 3; ++k)
     if (grid.size[k] > thin && (v[k] < reach || v[k] >= grid.size[k] - reach)) return true;
   return false;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The distance of the voxel that is farthest from the one that is farthest from `start`.

@@ -9,6 +9,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "base/median.h"
+
 namespace angiospline {
 namespace {
 
@@ -28,13 +30,6 @@ constexpr double kClearContrast = 0.5;     // of the median: nodes that a mean p
 constexpr int kSagSteps = 16;              // of the mean profile, even
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<WallSides> all_sides(const GreyField& field, const FitMesh& mesh,
                                  const Eigen::VectorXd& displacement, double gate) {
