@@ -216,9 +216,9 @@ void crowded() {
       };
       if (base == &alone) row("neighbour", mean_of(pair, noisy(pair)));
       row("1:1:2", mean_of(*unequal, noisy(*unequal)));
-      row("ramp", mean_of(*base, [&](std::uint64_t s) { return with_ramp(*base, snr, s); }));
+      row("ramp", mean_of(*base, [&, p = base](std::uint64_t s) { return with_ramp(*p, snr, s); }));
       row("Rician",
-          mean_of(*base, [&](std::uint64_t s) { return with_rician_noise(*base, snr, s); }));
+          mean_of(*base, [&, p = base](std::uint64_t s) { return with_rician_noise(*p, snr, s); }));
       std::printf("\n");
     }
   }

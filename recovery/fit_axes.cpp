@@ -21,7 +21,7 @@ constexpr int kCount = 31;
 
 class Axis {
  public:
-  explicit Axis(const AxisSections& sections) : sections_(sections), spline_(spline_of(sections)) {
+  explicit Axis(const AxisSections& sections) : spline_(spline_of(sections)) {
     const double spacing =
         (sections.along_mm(sections.along_mm.size() - 1) - sections.along_mm(0)) /
         static_cast<double>(sections.along_mm.size() - 1);
@@ -63,7 +63,6 @@ class Axis {
 
   double strength(int k) const { return unit_ * std::pow(10.0, kFirst + kStep * k); }
 
-  const AxisSections& sections_;
   PenalisedSpline spline_;
   double unit_ = 1.0;
   Eigen::VectorXd criteria_;
