@@ -115,6 +115,7 @@ Result<Fitted> fit_walls(const Model& model, const Image<float>& image,
   FitOptions options;
   options.dark = arguments.dark;
   options.capture = arguments.capture;
+  options.refinements = arguments.refinements;
   auto fitted = fit_model(model, image, options, progress);
   if (!fitted) return fail(fitted.error());
   const auto before = tessellate(model.network, {}, progress);

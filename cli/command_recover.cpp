@@ -93,6 +93,7 @@ Result<Model> model_of(const CenterlineTree& tree, const Mask& closed,
     if (!file) return fail(file.error());
     FitOptions options;
     options.dark = arguments.segment.dark;
+    options.refinements = arguments.refinements;
     const auto image = grey_image(file->image, path);
     auto fitted = image ? fit_tree(tree, *image, options, progress)
                         : Result<FittedModel>(fail(image.error()));

@@ -59,6 +59,7 @@ struct RecoverArguments {
   bool cut_contacts = false;
   std::string output_folder;
   bool fit = true;  // the model to the image, after it is seeded
+  int refinements = 3;
   bool json = false;
 };
 
@@ -70,6 +71,7 @@ struct FitArguments {
   std::string residual;  // .glb or .vtp with what is left as colours; may be empty
   bool dark = false;
   bool capture = true;
+  int refinements = 3;
   // The thesis's way, by edges that pull a mesh; no solver: the default fit.
   std::string solver;
   std::string potential = "gravity";

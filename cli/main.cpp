@@ -114,6 +114,14 @@ struct CommandLine {
   std::function<int()> verb;
 };
 
+CLI::Option* add_refinements_option(CLI::App* command, int& refinements) {
+  return command
+      ->add_option("--refinements", refinements,
+                   "rounds, at most, in which walls get more freedom where they miss the image by "
+                   "more than noise explains (default 3; 0 is quicker)")
+      ->check(CLI::Range(0, 10));
+}
+
 void add_recover(CLI::App& app, CommandLine& line) {
   CLI::App* command =
       app.add_subcommand("recover", "from an image to a CAD model, every stage kept");
@@ -124,6 +132,7 @@ void add_recover(CLI::App& app, CommandLine& line) {
   add_cut_option(command, line.recover.cut_contacts);
   command->add_flag("!--no-fit", line.recover.fit,
                     "keep the walls of the mask; do not fit them to the image");
+  add_refinements_option(command, line.recover.refinements);
   add_json_flag(command, line.recover.json);
   command->callback([&line] { line.verb = [&line] { return run_recover(line.recover); }; });
 }
@@ -195,6 +204,7 @@ void add_fit(CLI::App& app, CommandLine& line) {
   command->add_flag("--dark", a.dark, "vessels are darker than their background");
   command->add_flag("!--no-capture", a.capture,
                     "refine the surfaces as they are; do not move centerlines and radii first");
+  CLI::Option* refinements = add_refinements_option(command, a.refinements);
   CLI::Option* solver =
       command
           ->add_option(
@@ -203,7 +213,8 @@ void add_fit(CLI::App& app, CommandLine& line) {
               "euler-svd, euler-dft, euler-dft-phantom, central, central-dft, runge-kutta-1 "
               "or runge-kutta-4")
           ->check(CLI::IsMember({"sparse", "euler-svd", "euler-dft", "euler-dft-phantom", "central",
-                                 "central-dft", "runge-kutta-1", "runge-kutta-4"}));
+                                 "central-dft", "runge-kutta-1", "runge-kutta-4"}))
+          ->excludes(refinements);
   command->add_option("--potential", a.potential, "gravity (default) or spring")
       ->check(CLI::IsMember({"gravity", "spring"}))
       ->needs(solver);

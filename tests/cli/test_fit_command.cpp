@@ -8,6 +8,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "io/centerline_export.h"
+#include "io/centerline_file.h"
 #include "io/image_file.h"
 #include "io/model_file.h"
 #include "tests/cli/run_program.h"
@@ -107,6 +109,28 @@ TEST_F(Fit, RefinesAModelAsItIsWithoutCapture) {
   const ProgramRun run = fit({"--no-capture", "--json"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(nlohmann::json::parse(run.out)["fit"]["mean_axis_move_mm"], 0.0);
+}
+
+TEST_F(Fit, RefinesAsOftenAsIsAskedFor) {
+  // A model of 0.6 of the radius, so that the wall is far off where nothing is captured first.
+  auto tree = read_centerline_file(folder_ / "tree.swc");
+  ASSERT_TRUE(tree);
+  for (CenterlineBranch& branch : tree->branches) branch.radii_mm *= 0.6;
+  ASSERT_TRUE(write_centerline_file(folder_ / "thin.swc", *tree));
+  const std::string thin = folder_ / "thin.json";
+  ASSERT_EQ(run_angiospline({"seed", folder_ / "thin.swc", "-o", thin}).exit_code, 0);
+  const auto refined = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{
+        "fit", thin, folder_ / "image.nrrd", "--no-capture", "-o", folder_ / "out.json", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const ProgramRun run = run_angiospline(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return nlohmann::json::parse(run.out)["fit"]["refined"].size();
+  };
+  EXPECT_EQ(refined({}), 1U);
+  EXPECT_EQ(refined({"--refinements", "0"}), 0U);
+  EXPECT_EQ(fit({"--refinements", "11"}).exit_code, 2);
+  EXPECT_EQ(fit({"--refinements", "1", "--solver", "sparse"}).exit_code, 2);
 }
 
 TEST_F(Fit, SaysInOneLineWhatIsWrong) {
