@@ -80,10 +80,12 @@ std::vector<int> postorder(const std::vector<int>& parent) {
   return place;
 }
 
-// Eliminates the first `pivots` columns of a front's lower triangle.
-bool eliminate(Eigen::MatrixXd& F, int pivots, Eigen::VectorXd& diagonal) {
+// Eliminates the first columns of a front's lower triangle, as many as `diagonal` has. `room`
+// is overwritten.
+bool eliminate(Eigen::Map<Eigen::MatrixXd> F, Eigen::Map<Eigen::VectorXd> diagonal,
+               std::vector<double>& room) {
   const int size = static_cast<int>(F.rows());
-  Eigen::MatrixXd scaled;
+  const int pivots = static_cast<int>(diagonal.size());
   for (int first = 0; first < pivots; first += kBlock) {
     const int count = std::min(kBlock, pivots - first);
     const int end = first + count;
@@ -101,6 +103,8 @@ bool eliminate(Eigen::MatrixXd& F, int pivots, Eigen::VectorXd& diagonal) {
     const int rest = size - end;
     if (rest == 0) continue;
     const auto L = F.block(end, first, rest, count);
+    room.resize(std::max(room.size(), at(rest) * at(count)));
+    Eigen::Map<Eigen::MatrixXd> scaled(room.data(), rest, count);
     scaled.noalias() = L * diagonal.segment(first, count).asDiagonal();
     if (rest < kSmallFront) {
       for (int j = 0; j < rest; ++j) {
@@ -204,34 +208,52 @@ void FrontalFactor::place_entries(const Eigen::SparseMatrix<double>& lower) {
       front.entries.push_back({k, column * front.size() + row_in(front, std::max(a, b))});
     }
   }
+  std::size_t panels = 0, pivots = 0;
   for (int f = 0; f < static_cast<int>(fronts_.size()); ++f) {
     Front& front = fronts_[at(f)];
-    front.matrix.resize(front.size(), front.size());
-    front.diagonal.resize(front.pivots);
-    if (front.size() == front.pivots) continue;
+    front.panel = std::exchange(panels, panels + at(front.size()) * at(front.pivots));
+    front.first = std::exchange(pivots, pivots + at(front.pivots));
+    if (front.below() == 0) continue;
     front.parent = front_of[at(front.rows[at(front.pivots)])];
     fronts_[at(front.parent)].children.push_back(f);
     for (int k = front.pivots; k < front.size(); ++k) {
       front.rows_in_parent.push_back(row_in(fronts_[at(front.parent)], front.rows[at(k)]));
     }
   }
+  panels_.resize(panels);
+  diagonal_.resize(pivots);
 }
 
 bool FrontalFactor::factor(const Eigen::SparseMatrix<double>& lower) {
   const double* values = lower.valuePtr();
-  for (Front& front : fronts_) {
-    front.matrix.setZero();
-    for (const Entry& e : front.entries) front.matrix.data()[e.place] = values[e.value];
+  waiting_.clear();
+  for (const Front& front : fronts_) {
+    const int size = front.size();
+    work_.assign(at(size) * at(size), 0.0);
+    Eigen::Map<Eigen::MatrixXd> F(work_.data(), size, size);
+    for (const Entry& e : front.entries) work_[static_cast<std::size_t>(e.place)] = values[e.value];
+    // Children were met right before, each with all of its own: theirs lie on top.
+    std::size_t all = 0;
+    for (const int c : front.children)
+      all += at(fronts_[at(c)].below()) * at(fronts_[at(c)].below());
+    const double* update = waiting_.data() + (waiting_.size() - all);
     for (const int c : front.children) {
       const Front& child = fronts_[at(c)];
-      const int count = child.size() - child.pivots;
+      const int count = child.below();
       for (int j = 0; j < count; ++j) {
-        const double* from = &child.matrix(child.pivots, child.pivots + j);
-        double* to = front.matrix.col(child.rows_in_parent[at(j)]).data();
+        const double* from = update + j * count;
+        double* to = F.col(child.rows_in_parent[at(j)]).data();
         for (int i = j; i < count; ++i) to[child.rows_in_parent[at(i)]] += from[i];
       }
+      update += count * count;
     }
-    if (!eliminate(front.matrix, front.pivots, front.diagonal)) return false;
+    waiting_.resize(waiting_.size() - all);
+    if (!eliminate(F, {diagonal_.data() + front.first, front.pivots}, scaled_)) return false;
+    const auto end = work_.begin() + static_cast<std::ptrdiff_t>(size) * front.pivots;
+    std::copy(work_.begin(), end, panels_.begin() + static_cast<std::ptrdiff_t>(front.panel));
+    for (int j = front.pivots; j < size; ++j) {
+      waiting_.insert(waiting_.end(), &F(front.pivots, j), F.col(j).data() + size);
+    }
   }
   return true;
 }
@@ -239,27 +261,23 @@ bool FrontalFactor::factor(const Eigen::SparseMatrix<double>& lower) {
 Eigen::VectorXd FrontalFactor::solve(const Eigen::VectorXd& right) const {
   Eigen::VectorXd x(right.size());
   for (Eigen::Index k = 0; k < right.size(); ++k) x(place_[static_cast<std::size_t>(k)]) = right(k);
-  Eigen::VectorXd part;
+  Eigen::VectorXd part(right.size());
   for (const Front& front : fronts_) {
+    const Panel L = panel_of(front);
     auto own = x.segment(front.rows.front(), front.pivots);
-    front.matrix.topLeftCorner(front.pivots, front.pivots)
-        .triangularView<Eigen::UnitLower>()
-        .solveInPlace(own);
-    const int count = front.size() - front.pivots;
-    part.noalias() = front.matrix.bottomLeftCorner(count, front.pivots) * own;
+    L.topRows(front.pivots).triangularView<Eigen::UnitLower>().solveInPlace(own);
+    const int count = front.below();
+    part.head(count).noalias() = L.bottomRows(count) * own;
     for (int i = 0; i < count; ++i) x(front.rows[at(front.pivots + i)]) -= part(i);
   }
   for (auto front = fronts_.rbegin(); front != fronts_.rend(); ++front) {
+    const Panel L = panel_of(*front);
     auto own = x.segment(front->rows.front(), front->pivots);
-    own.array() /= front->diagonal.array();
-    const int count = front->size() - front->pivots;
-    part.resize(count);
+    own.array() /= Eigen::Map<const Eigen::ArrayXd>(diagonal_.data() + front->first, front->pivots);
+    const int count = front->below();
     for (int i = 0; i < count; ++i) part(i) = x(front->rows[at(front->pivots + i)]);
-    own.noalias() -= front->matrix.bottomLeftCorner(count, front->pivots).transpose() * part;
-    front->matrix.topLeftCorner(front->pivots, front->pivots)
-        .triangularView<Eigen::UnitLower>()
-        .transpose()
-        .solveInPlace(own);
+    own.noalias() -= L.bottomRows(count).transpose() * part.head(count);
+    L.topRows(front->pivots).triangularView<Eigen::UnitLower>().transpose().solveInPlace(own);
   }
   Eigen::VectorXd result(right.size());
   for (Eigen::Index k = 0; k < right.size(); ++k) {

@@ -38,11 +38,17 @@ class FrontalFactor {
     int parent = -1;
     std::vector<int> rows_in_parent;  // of the rows after the pivots
     std::vector<int> children;
-    Eigen::MatrixXd matrix;  // lower triangle; L below the pivots once factored
-    Eigen::VectorXd diagonal;
+    std::size_t panel = 0;  // where its columns of L begin, each as long as the front
+    std::size_t first = 0;  // of its diagonal
 
     int size() const { return static_cast<int>(rows.size()); }
+    int below() const { return size() - pivots; }
   };
+  using Panel = Eigen::Map<const Eigen::MatrixXd>;
+
+  Panel panel_of(const Front& front) const {
+    return {panels_.data() + front.panel, front.size(), front.pivots};
+  }
 
   void find_order(const Eigen::SparseMatrix<double>& lower);
   void find_fronts(const Eigen::SparseMatrix<double>& lower);
@@ -50,6 +56,10 @@ class FrontalFactor {
 
   std::vector<int> place_;     // of each row in the order of elimination
   std::vector<Front> fronts_;  // children before parents
+  std::vector<double> panels_, diagonal_;
+  // While factoring: the front at work, the updates that wait for their parents (the last front's
+  // on top), and L D of a block.
+  std::vector<double> work_, waiting_, scaled_;
 };
 
 }  // namespace angiospline

@@ -21,33 +21,6 @@ constexpr double kWaveRadii = 2.5;  // the longest L of factor one
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
-// One round's measurements.
-struct Offsets {
-  Eigen::VectorXd mm;
-  Eigen::VectorXd weight;
-};
-
-Offsets measure_offsets(const GreyField& field, const FitMesh& mesh, const WallGreys& greys,
-                        const Eigen::VectorXd& displacement, double half_window) {
-  const ProfileSag sag(field, mesh, greys, displacement, half_window);
-  Offsets all{Eigen::VectorXd::Zero(mesh.size()), Eigen::VectorXd::Zero(mesh.size())};
-  tbb::parallel_for(std::size_t{0}, mesh.nodes.size(), [&](std::size_t i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    const WallLevels levels{greys.inside(k), greys.outside(k)};
-    const bool clear = levels.contrast() >= kLeastContrast * greys.contrast;
-    if (mesh.near_rim[i] || !clear) return;
-    const WallPoint p = parallel_point(mesh.nodes[i], displacement(k));
-    const WallOffset offset =
-        wall_offset(field, p, levels, {half_window, std::min(greys.noise, greys.contrast)});
-    if (!offset.measured) return;
-    all.mm(k) = offset.offset_mm - sag.offset_mm(field, p);
-    const double relative = levels.contrast() / greys.contrast;
-    all.weight(k) =
-        std::min(1.0, relative * relative) * 2 * half_window * field.voxel_mm() / offset.window_mm;
-  });
-  return all;
-}
-
 std::vector<double> region_evidence(const GreyField& field, const FitMesh& mesh,
                                     const WallGreys& greys, const Eigen::VectorXd& displacement) {
   const int regions = *std::max_element(mesh.regions.begin(), mesh.regions.end()) + 1;
@@ -65,10 +38,6 @@ std::vector<double> region_evidence(const GreyField& field, const FitMesh& mesh,
   for (std::size_t r = 0; r < sum.size(); ++r) sum[r] = count[r] > 0 ? sum[r] / count[r] : 0.0;
   return sum;
 }
-
-}  // namespace
-
-namespace {
 
 // The factor with the least expected squared error: from the rule's own, up or down while it falls.
 void choose_wave(MeshSmoother& smoother, const Eigen::VectorXd& wanted,
@@ -104,6 +73,27 @@ void choose_wave(MeshSmoother& smoother, const Eigen::VectorXd& wanted,
 
 }  // namespace
 
+WallOffsets wall_offsets(const GreyField& field, const FitMesh& mesh, const WallGreys& greys,
+                         const Eigen::VectorXd& displacement, double half_window) {
+  const ProfileSag sag(field, mesh, greys, displacement, half_window);
+  WallOffsets all{Eigen::VectorXd::Zero(mesh.size()), Eigen::VectorXd::Zero(mesh.size())};
+  tbb::parallel_for(std::size_t{0}, mesh.nodes.size(), [&](std::size_t i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const WallLevels levels{greys.inside(k), greys.outside(k)};
+    const bool clear = levels.contrast() >= kLeastContrast * greys.contrast;
+    if (mesh.near_rim[i] || !clear) return;
+    const WallPoint p = parallel_point(mesh.nodes[i], displacement(k));
+    const WallOffset offset =
+        wall_offset(field, p, levels, {half_window, std::min(greys.noise, greys.contrast)});
+    if (!offset.measured) return;
+    all.mm(k) = offset.offset_mm - sag.offset_mm(field, p);
+    const double relative = levels.contrast() / greys.contrast;
+    all.weight(k) =
+        std::min(1.0, relative * relative) * 2 * half_window * field.voxel_mm() / offset.window_mm;
+  });
+  return all;
+}
+
 Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
                                const DisplacementOptions& options, const Progress& progress) {
   EXPECTS(mesh.size() > 0 && !options.half_windows_vox.empty());
@@ -116,7 +106,9 @@ Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, Mesh
                 static_cast<double>(round) / static_cast<double>(options.half_windows_vox.size()));
     if (progress.should_stop()) return result;
     const bool last = round + 1 == options.half_windows_vox.size();
-    if (round == 0 || last) {
+    if (options.greys != nullptr) {
+      result.greys = *options.greys;
+    } else if (round == 0 || last) {
       // The levels are taken from a smoother wall: one that follows the noise would have bright
       // noise inside and dark noise outside.
       const Eigen::VectorXd broad = smoother.mean(result.normal_mm, Eigen::VectorXd::Ones(n),
@@ -130,16 +122,20 @@ Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, Mesh
       farthest(k) = options.largest_move_radii * mesh.radii_mm[at(k)];
     }
     const double half = options.half_windows_vox[round];
-    const Offsets offsets = measure_offsets(field, mesh, result.greys, result.normal_mm, half);
+    const WallOffsets offsets = wall_offsets(field, mesh, result.greys, result.normal_mm, half);
     const Eigen::VectorXd wanted = result.normal_mm + offsets.mm;
     Eigen::VectorXd weights = offsets.weight;
     if (progress.should_stop()) return result;
     Eigen::VectorXd smooth = smoother.fair(wanted, weights, result.wave_factor * waves);
     if (last && !progress.should_stop()) {
       weigh_outliers(wanted - smooth, offsets.weight, 0.1 * field.voxel_mm(), weights);
-      const double density = result.greys.noise_density(field, half, smoother);
-      choose_wave(smoother, wanted, weights, waves, density, options.wave_factors, progress,
-                  result);
+      if (options.wave_factors.size() == 1) {
+        result.wave_factor = options.wave_factors.front();
+      } else {
+        const double density = result.greys.noise_density(field, half, smoother);
+        choose_wave(smoother, wanted, weights, waves, density, options.wave_factors, progress,
+                    result);
+      }
       smooth = smoother.fair(wanted, weights, result.wave_factor * waves);
     }
     result.normal_mm = smooth.cwiseMin(farthest).cwiseMax(-farthest);

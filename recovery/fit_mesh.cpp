@@ -7,8 +7,10 @@
 
 #include <Eigen/Geometry>
 
+#include "base/contract.h"
 #include "base/random.h"
 #include "kernel/curvature.h"
+#include "modeling/point_index.h"
 
 namespace angiospline {
 namespace {
@@ -52,15 +54,20 @@ WallPart wall_of(const Tessellation& mesh, int regions, std::vector<int>& region
   return wall;
 }
 
+// Each node is judged by the rim nearest to it. O(nodes log rims).
 std::vector<char> nodes_near_rims(const SurfaceNetwork& network, const FitMesh& mesh,
                                   double margin_mm) {
   std::vector<char> near(mesh.nodes.size(), 0);
-  for (const Rim& rim : network.rims) {
-    for (std::size_t k = 0; k < near.size(); ++k) {
-      const Vec3 d = mesh.nodes[k].point_mm - rim.center_mm;
-      const double along = d.dot(rim.normal);
-      if (std::abs(along) <= margin_mm && d.norm() < 2 * rim.radius_mm + margin_mm) near[k] = 1;
-    }
+  if (network.rims.empty()) return near;
+  Points3 centers(3, std::ssize(network.rims));
+  for (std::size_t r = 0; r < network.rims.size(); ++r) {
+    centers.col(static_cast<Eigen::Index>(r)) = network.rims[r].center_mm;
+  }
+  const PointIndex index(centers);
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const Rim& rim = network.rims[at(index.nearest(mesh.nodes[k].point_mm).point)];
+    const Vec3 d = mesh.nodes[k].point_mm - rim.center_mm;
+    near[k] = std::abs(rim.normal.dot(d)) <= margin_mm && d.norm() < 2 * rim.radius_mm + margin_mm;
   }
   return near;
 }
@@ -143,6 +150,19 @@ Points3 moved_normals(const FitMesh& mesh, const Eigen::VectorXd& displacement) 
   return turned;
 }
 
+namespace {
+
+// Of a symmetric matrix; the pattern is analysed the first time.
+const FrontalFactor& factored(std::optional<FrontalFactor>& known,
+                              const Eigen::SparseMatrix<double>& A) {
+  const Eigen::SparseMatrix<double> lower = A.triangularView<Eigen::Lower>();
+  if (!known) known.emplace(lower);
+  EXPECTS(known->factor(lower));
+  return *known;
+}
+
+}  // namespace
+
 MeshSmoother::MeshSmoother(const FitMesh& mesh) {
   const int n = mesh.size();
   mass_ = Eigen::VectorXd::Zero(n);
@@ -172,12 +192,10 @@ MeshSmoother::MeshSmoother(const FitMesh& mesh) {
 }
 
 Eigen::VectorXd MeshSmoother::mean(const Eigen::VectorXd& values, const Eigen::VectorXd& weights,
-                                   double length_mm) const {
-  const Eigen::VectorXd w = weights.cwiseMax(kFloor).cwiseProduct(mass_);
+                                   double length_mm) {
   Matrix A = length_mm * length_mm * stiffness_;
-  A.diagonal() += w;
-  const Solver solver(A);
-  return solver.solve(weights.cwiseProduct(mass_).cwiseProduct(values));
+  A.diagonal() += weights.cwiseMax(kFloor).cwiseProduct(mass_);
+  return factored(mean_factor_, A).solve(weights.cwiseProduct(mass_).cwiseProduct(values));
 }
 
 Eigen::VectorXd MeshSmoother::fair(const Eigen::VectorXd& values, const Eigen::VectorXd& weights,
@@ -188,12 +206,7 @@ Eigen::VectorXd MeshSmoother::fair(const Eigen::VectorXd& values, const Eigen::V
   Matrix A = stiffness_ * scaled;
   weighted_mass_ = weights.cwiseProduct(mass_);
   A.diagonal() += weights.cwiseMax(kFloor).cwiseProduct(mass_);
-  if (!analysed_) {
-    fair_solver_.analyzePattern(A);
-    analysed_ = true;
-  }
-  fair_solver_.factorize(A);
-  return fair_solver_.solve(weighted_mass_.cwiseProduct(values));
+  return factored(fair_factor_, A).solve(weighted_mass_.cwiseProduct(values));
 }
 
 double MeshSmoother::degrees_of_freedom() const {
@@ -203,7 +216,7 @@ double MeshSmoother::degrees_of_freedom() const {
   for (int probe = 0; probe < kProbes; ++probe) {
     Eigen::VectorXd signs(mass_.size());
     for (double& s : signs) s = random.bits() % 2 == 0 ? 1.0 : -1.0;
-    sum += signs.dot(fair_solver_.solve(weighted_mass_.cwiseProduct(signs)));
+    sum += signs.dot(fair_factor_->solve(weighted_mass_.cwiseProduct(signs)));
   }
   return sum / kProbes;
 }

@@ -1,13 +1,14 @@
 // The wall of a network as one finite-element mesh, and smooth functions on it.
 #pragma once
 
+#include <optional>
 #include <vector>
 
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "modeling/frontal_factor.h"
 #include "modeling/tessellation.h"
 #include "recovery/wall_profile.h"
 
@@ -60,7 +61,7 @@ class MeshSmoother {
   // Least sum_i w_i m_i (f_i - value_i)^2 + l^2 int |grad f|^2: means over some l around each node;
   // where weights are zero, those of the neighbours. Zero where a whole component has no weight.
   Eigen::VectorXd mean(const Eigen::VectorXd& values, const Eigen::VectorXd& weights,
-                       double length_mm) const;
+                       double length_mm);
 
   // Least sum_i w_i m_i (f_i - value_i)^2 + sum_i (L_i / 2 pi)^4 m_i (laplacian f)_i^2: a wave of
   // length L comes through by half where weights are one, longer ones better, shorter ones less (by
@@ -74,13 +75,11 @@ class MeshSmoother {
 
  private:
   using Matrix = Eigen::SparseMatrix<double>;
-  using Solver = Eigen::SimplicialLDLT<Matrix, Eigen::Lower>;
 
   Matrix stiffness_;
   Eigen::VectorXd mass_;
   Eigen::VectorXd weighted_mass_;  // of the last fair()
-  Solver fair_solver_;
-  bool analysed_ = false;
+  std::optional<FrontalFactor> mean_factor_, fair_factor_;
 };
 
 }  // namespace angiospline

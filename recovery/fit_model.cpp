@@ -7,11 +7,10 @@
 
 #include <fmt/format.h>
 
-#include "modeling/certificate.h"
 #include "recovery/closed_surface.h"
 #include "recovery/fit_capture.h"
-#include "recovery/fit_refinement.h"
 #include "recovery/fit_rings.h"
+#include "recovery/refit.h"
 
 namespace angiospline {
 namespace {
@@ -19,10 +18,7 @@ namespace {
 constexpr double kEvidence = 0.25;  // of the contrast across a region's wall: less is no wall
 constexpr std::array<double, 2> kCaptureWindows{0.4, 0.2};  // of a closed surface, in its radii
 constexpr int kClosedRounds = 2;
-constexpr double kRefinedRimVox = 4.0;    // of an end: what an end does to a wall is no residual
-constexpr double kProgress = 0.7;         // of large residuals left, for another round
-constexpr double kShortestSpanVox = 1.0;  // of a body, where residuals are large
-constexpr double kLeastCovered = 0.5;     // of the nodes: fewer in the image, and the frames differ
+constexpr double kLeastCovered = 0.5;  // of the nodes: fewer in the image, and the frames differ
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
@@ -112,7 +108,7 @@ class Fitter {
         return fail(moved.error());
       }
     }
-    if (auto fine = fit_again_where_large(network, fitted.report); !fine) {
+    if (auto fine = refit_where_large(field_, options_, network, fitted.report, progress_); !fine) {
       return fail(fine.error());
     }
     for (const std::string& name : fitted.report.without_edge) {
@@ -133,104 +129,6 @@ class Fitter {
   void reduce(SurfaceNetwork& network, FitReport& report) const {
     report.reduction_mm = options_.reduction * field_.voxel_mm() / report.snr;
     if (report.reduction_mm > 0) network = with_fewer_knots(network, report.reduction_mm);
-  }
-
-  // Regions whose wall is not to be moved.
-  std::vector<char> untouched(const SurfaceNetwork& network, const FitReport& report) const {
-    std::vector<char> regions(network.regions.size(), 0);
-    for (std::size_t r = 0; r < regions.size(); ++r) {
-      const std::string& name = network.regions[r].name;
-      const auto named = [&](const HeldRegion& h) { return h.name == name; };
-      const auto& without = report.without_edge;
-      regions[r] = std::any_of(report.held.begin(), report.held.end(), named) ||
-                   std::find(without.begin(), without.end(), name) != without.end();
-    }
-    return regions;
-  }
-
-  // Looks where residuals are larger than noise explains; halves spans there, and fits there again
-  // with waves half as long as the time before. A region that would fold is left as it was before;
-  // one whose residuals hardly fall is left where it has come to.
-  Result<void> fit_again_where_large(SurfaceNetwork& network, FitReport& report) {
-    std::vector<char> excluded = untouched(network, report);
-    const SurfaceNetwork before = network;
-    std::vector<double> amounts(network.regions.size(), std::numeric_limits<double>::infinity());
-    FitMeshOptions spacing;
-    spacing.voxel_mm = field_.voxel_mm();
-    spacing.rim_margin_vox = kRefinedRimVox;
-    DisplacementOptions local = options_.displacement;
-    local.wave_factors = {0.5};
-    for (int round = 0; round < options_.refinements;) {
-      if (progress_.should_stop()) return fail(cancelled("refinement"));
-      const auto coarse = make_fit_mesh(network, spacing, progress_);
-      if (!coarse) return fail(coarse.error());
-      MeshSmoother smoother(*coarse);
-      const LargeResiduals large = large_residuals(field_, network, *coarse, smoother, excluded);
-      if (!large.any()) break;
-      if (exclude_stuck(large, amounts, excluded)) continue;
-      const RefinedNetwork finer =
-          refined_where_large(network, *coarse, large, kShortestSpanVox * field_.voxel_mm());
-      const auto mesh = make_fit_mesh(finer.network, spacing, progress_);
-      if (!mesh) return fail(mesh.error());
-      MeshSmoother fine(*mesh);
-      const LargeResiduals there = large_residuals(field_, finer.network, *mesh, fine, excluded);
-      const Displacement wall = wall_displacement(field_, *mesh, fine, local, progress_);
-      report.iterations += static_cast<int>(local.half_windows_vox.size());
-      auto moved =
-          move_network(finer.network, *mesh, wall.normal_mm.cwiseProduct(there.share), progress_);
-      if (!moved) return fail(moved.error());
-      if (exclude_held(network, moved->held, large, excluded)) continue;
-      network = std::move(moved->network);
-      for (const std::string& name : finer.regions) {
-        auto& known = report.refined;
-        if (std::find(known.begin(), known.end(), name) == known.end()) known.push_back(name);
-      }
-      ++round;
-      amounts = large.amounts_mm3;
-      local.wave_factors.front() /= 2;
-    }
-    if (!report.refined.empty()) keep_if_sound(before, network, report);
-    return {};
-  }
-
-  // Finer walls that cross themselves are not kept.
-  static void keep_if_sound(const SurfaceNetwork& before, SurfaceNetwork& network,
-                            FitReport& report) {
-    const auto certificate = certify(network);
-    if (certificate && !certificate->self_intersecting) return;
-    network = before;
-    for (const std::string& name : report.refined) {
-      report.held.push_back(
-          {name, "with more knots where its residual is large it crosses itself"});
-    }
-    report.refined.clear();
-  }
-
-  // Excludes the regions whose large residuals the round before did not make smaller.
-  static bool exclude_stuck(const LargeResiduals& large, const std::vector<double>& before,
-                            std::vector<char>& excluded) {
-    bool any = false;
-    for (std::size_t r = 0; r < excluded.size(); ++r) {
-      if (excluded[r] || !large.regions[r] || before[r] == 0) continue;
-      if (large.amounts_mm3[r] < kProgress * before[r]) continue;
-      excluded[r] = 1;
-      any = true;
-    }
-    return any;
-  }
-
-  // Excludes the regions that were to move and could not; whether there are any.
-  static bool exclude_held(const SurfaceNetwork& network, const std::vector<HeldRegion>& held,
-                           const LargeResiduals& large, std::vector<char>& excluded) {
-    bool any = false;
-    for (std::size_t r = 0; r < excluded.size(); ++r) {
-      const auto named = [&](const HeldRegion& h) { return h.name == network.regions[r].name; };
-      if (excluded[r] || !large.regions[r]) continue;
-      if (std::none_of(held.begin(), held.end(), named)) continue;
-      excluded[r] = 1;
-      any = true;
-    }
-    return any;
   }
 
   Result<void> refine(SurfaceNetwork& network, FitReport& report,

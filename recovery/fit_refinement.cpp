@@ -4,14 +4,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/median.h"
 #include "recovery/closed_surface.h"
 #include "recovery/fit_rings.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kReachRadii = 0.5;       // around large residuals that moves die out over
 constexpr double kNone = 0.02;            // of the mean of marks around: nothing moves
 constexpr double kFull = 0.2;             // of the mean of marks around: the whole move is taken
 constexpr double kPatchSpans = 4.0;       // a closed surface's patch is worth so many spans
@@ -52,28 +50,33 @@ bool LargeResiduals::any() const {
   return std::find(regions.begin(), regions.end(), char{1}) != regions.end();
 }
 
+void LargeResiduals::leave_out(const FitMesh& mesh, int region) {
+  regions[at(region)] = 0;
+  for (std::size_t k = 0; k < large.size(); ++k) {
+    if (mesh.regions[k] == region) large[k] = 0;
+  }
+}
+
 LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& network,
-                               const FitMesh& mesh, MeshSmoother& smoother,
+                               const FitMesh& mesh, MeshSmoother& smoother, const WallGreys& greys,
                                const std::vector<char>& excluded, const ResidualOptions& options) {
   const Eigen::Index n = mesh.size();
-  DisplacementOptions once;
-  once.half_windows_vox = {options.half_window_vox};
-  once.wave_factors = {1.0};
-  once.largest_move_radii = 1e9;
-  const Displacement wall = wall_displacement(field, mesh, smoother, once);
-  const double voxel = field.voxel_mm();
-  const double reach = options.mean_vox * voxel;
   LargeResiduals found;
-  found.mean_mm = smoother.mean(wall.normal_mm + wall.residual_mm, wall.weight, reach);
+  found.mean_mm = Eigen::VectorXd::Zero(n);
   found.large.assign(mesh.nodes.size(), 0);
   found.regions.assign(network.regions.size(), 0);
   found.amounts_mm3.assign(network.regions.size(), 0.0);
+  if (!(greys.contrast > 0)) return found;
+  const WallOffsets wall =
+      wall_offsets(field, mesh, greys, Eigen::VectorXd::Zero(n), options.half_window_vox);
+  const double voxel = field.voxel_mm();
+  const double reach = options.mean_vox * voxel;
+  found.mean_mm = smoother.mean(wall.mm, wall.weight, reach);
   // Of (1 - l^2 Laplacian)^-1 white noise of density S keeps the variance S / (4 pi l^2).
-  const double noise = wall.greys.noise_density(field, options.half_window_vox, smoother);
+  const double noise = greys.noise_density(field, options.half_window_vox, smoother);
   const double deviation = std::sqrt(noise / (4 * std::numbers::pi)) / reach;
   const double least = std::max(options.deviations * deviation, options.least_vox * voxel);
   const std::vector<std::vector<int>> closed = closed_patches(network);
-  Eigen::VectorXd marks = Eigen::VectorXd::Zero(n);
   for (Eigen::Index k = 0; k < n; ++k) {
     const std::size_t r = at(mesh.regions[at(k)]);
     const bool refinable = network.regions[r].kind == RegionKind::kBody || !closed[r].empty();
@@ -81,23 +84,26 @@ LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& net
     if (!(std::abs(found.mean_mm(k)) > least)) continue;
     found.large[at(k)] = found.regions[r] = 1;
     found.amounts_mm3[r] += std::abs(found.mean_mm(k)) * smoother.mass_mm2()(k);
-    marks(k) = 1;
-  }
-  found.share = Eigen::VectorXd::Zero(n);
-  if (!found.any()) return found;
-  const double around = std::max(reach, kReachRadii * median(mesh.radii_mm));
-  const Eigen::VectorXd near = smoother.mean(marks, Eigen::VectorXd::Ones(n), around);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const std::size_t r = at(mesh.regions[at(k)]);
-    const double t =
-        found.large[at(k)] ? 1.0 : std::clamp((near(k) - kNone) / (kFull - kNone), 0.0, 1.0);
-    if (!excluded[r]) found.share(k) = t * t * (3 - 2 * t);
   }
   return found;
 }
 
+Eigen::VectorXd share_around(const std::vector<char>& marks, MeshSmoother& smoother,
+                             double around) {
+  const Eigen::Index n = std::ssize(marks);
+  Eigen::VectorXd values(n), share(n);
+  for (Eigen::Index k = 0; k < n; ++k) values(k) = marks[at(k)];
+  const Eigen::VectorXd near = smoother.mean(values, Eigen::VectorXd::Ones(n), around);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double t = marks[at(k)] ? 1.0 : std::clamp((near(k) - kNone) / (kFull - kNone), 0.0, 1.0);
+    share(k) = t * t * (3 - 2 * t);
+  }
+  return share;
+}
+
 RefinedNetwork refined_where_large(const SurfaceNetwork& network, const FitMesh& mesh,
-                                   const LargeResiduals& residuals, double shortest_mm) {
+                                   const LargeResiduals& residuals, const Eigen::VectorXd& share,
+                                   double shortest_mm) {
   const std::vector<StripRing> rings = strip_rings(network);
   std::vector<int> ring_of(network.patches.size(), -1);
   std::vector<std::vector<char>> marked(rings.size());  // spans
@@ -109,7 +115,7 @@ RefinedNetwork refined_where_large(const SurfaceNetwork& network, const FitMesh&
   }
   for (int k = 0; k < mesh.size(); ++k) {
     const int r = ring_of[at(mesh.origins[at(k)].patch)];
-    if (r < 0 || !(residuals.share(k) > 0.5)) continue;
+    if (r < 0 || !(share(k) > 0.5)) continue;
     const std::vector<double> breaks = rings[at(r)].u.breakpoints();
     const auto next = std::upper_bound(breaks.begin(), breaks.end(), mesh.origins[at(k)].uv.x());
     const auto span =

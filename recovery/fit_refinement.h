@@ -21,26 +21,34 @@ struct LargeResiduals {
   std::vector<char> large;          // of each node
   std::vector<char> regions;        // of the network: has any
   std::vector<double> amounts_mm3;  // of each region: their sizes times their areas
-  Eigen::VectorXd share;            // 1 where large, falling to 0 over half a radius around
 
   bool any() const;
+  // From now on nothing of the region is large.
+  void leave_out(const FitMesh& mesh, int region);
 };
 
 // Measures the wall from where the mesh is. Regions with `excluded` set are not looked at, nor are
 // junctions, whose patches get no more freedom.
 LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& network,
-                               const FitMesh& mesh, MeshSmoother& smoother,
+                               const FitMesh& mesh, MeshSmoother& smoother, const WallGreys& greys,
                                const std::vector<char>& excluded,
                                const ResidualOptions& options = {});
+
+// How far what marks stand for moves nodes around: 1 at marks, falling to 0 within some four times
+// `around_mm`.
+Eigen::VectorXd share_around(const std::vector<char>& marks, MeshSmoother& smoother,
+                             double around_mm);
 
 // More freedom where residuals are large: spans of bodies are halved, down to `shortest_mm`;
 // closed surfaces get four patches for each, unless patches would be shorter than four times that.
 // The surfaces are the same; patches keep their numbers. The names of the regions that got any.
+// `share` is that of each node's move that is to be taken.
 struct RefinedNetwork {
   SurfaceNetwork network;
   std::vector<std::string> regions;
 };
 RefinedNetwork refined_where_large(const SurfaceNetwork& network, const FitMesh& mesh,
-                                   const LargeResiduals& residuals, double shortest_mm);
+                                   const LargeResiduals& residuals, const Eigen::VectorXd& share,
+                                   double shortest_mm);
 
 }  // namespace angiospline

@@ -10,6 +10,7 @@
 #include "modeling/seed_model.h"
 #include "modeling/tessellation.h"
 #include "recovery/closed_surface.h"
+#include "recovery/fit_mesh_part.h"
 #include "recovery/fit_model.h"
 #include "recovery/rasterize.h"
 
@@ -134,6 +135,46 @@ TEST(FitRefinement, QuartersAClosedSurfaceAtABulge) {
   EXPECT_LT(after.near, 0.8 * before.near);
   EXPECT_LT(after.elsewhere, 1.2 * before.elsewhere);
   expect_sound(fine->model.network);
+}
+
+TEST(FitMeshPart, HasTheWholeMeshsAnswersInItsMiddle) {
+  const auto model = seed_model(straight());
+  FitMeshOptions spacing;
+  const auto whole = make_fit_mesh(model->network, spacing);
+  const Vec3 place = kMiddle + kRadius * Vec3::UnitX();
+  const FitMeshPart part = part_near(*whole, place, 12.0);
+  ASSERT_GT(part.mesh.size(), 200);
+  ASSERT_LT(2 * part.mesh.size(), whole->size());
+  Random random(3);
+  Eigen::VectorXd values(whole->size()), there(part.mesh.size());
+  for (double& v : values) v = random.gaussian();
+  for (int k = 0; k < part.mesh.size(); ++k) {
+    const int node = part.nodes[static_cast<std::size_t>(k)];
+    there(k) = values(node);
+    ASSERT_EQ(part.mesh.nodes[static_cast<std::size_t>(k)].point_mm,
+              whole->nodes[static_cast<std::size_t>(node)].point_mm);
+  }
+  MeshSmoother smooth_whole(*whole), smooth_part(part.mesh);
+  const auto ones = [](Eigen::Index n) { return Eigen::VectorXd::Ones(n).eval(); };
+  const Eigen::VectorXd mean = smooth_whole.mean(values, ones(values.size()), 1.0);
+  const Eigen::VectorXd mean_there = smooth_part.mean(there, ones(there.size()), 1.0);
+  const Eigen::VectorXd fair =
+      smooth_whole.fair(values, ones(values.size()), 6.0 * ones(values.size()));
+  const Eigen::VectorXd fair_there =
+      smooth_part.fair(there, ones(there.size()), 6.0 * ones(there.size()));
+  int middle = 0;
+  for (int k = 0; k < part.mesh.size(); ++k) {
+    const int node = part.nodes[static_cast<std::size_t>(k)];
+    if ((whole->nodes[static_cast<std::size_t>(node)].point_mm - place).norm() > 4) continue;
+    ++middle;
+    EXPECT_NEAR(mean_there(k), mean(node), 2e-3);
+    EXPECT_NEAR(fair_there(k), fair(node), 2e-3);
+  }
+  EXPECT_GT(middle, 20);
+  // Values go back to where they came from; elsewhere there are none.
+  const Eigen::VectorXd back = part.spread(there, whole->size());
+  EXPECT_NEAR(back.squaredNorm(), there.squaredNorm(), 1e-9);
+  EXPECT_EQ(back(part.nodes[5]), values(part.nodes[5]));
 }
 
 TEST(FitRefinement, LeavesAPlainWallAlone) {
