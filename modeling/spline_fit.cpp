@@ -87,6 +87,8 @@ Eigen::MatrixXd fit_spline(const KnotVector& knots, const SplineFitProblem& prob
   const Eigen::Index last = problem.last.rows();
   const Eigen::Index dimension = problem.values.cols();
   EXPECTS(first + last <= n);
+  EXPECTS(first == 0 || problem.first.cols() == dimension);
+  EXPECTS(last == 0 || problem.last.cols() == dimension);
   EXPECTS(static_cast<Eigen::Index>(problem.parameters.size()) == problem.values.rows());
   EXPECTS(problem.weights.empty() || problem.weights.size() == problem.parameters.size());
 
@@ -105,8 +107,8 @@ Eigen::MatrixXd fit_spline(const KnotVector& knots, const SplineFitProblem& prob
 
   // Held rows leave the system: their columns go to the right-hand side.
   Eigen::MatrixXd held = Eigen::MatrixXd::Zero(n, dimension);
-  held.topRows(first) = problem.first;
-  held.bottomRows(last) = problem.last;
+  if (first > 0) held.topRows(first) = problem.first;
+  if (last > 0) held.bottomRows(last) = problem.last;
   const Eigen::Index free = n - first - last;
   BandMatrix reduced(free, knots.degree());
   Eigen::MatrixXd x = b.middleRows(first, free);
