@@ -76,11 +76,9 @@ LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& net
   const double noise = greys.noise_density(field, options.half_window_vox, smoother);
   const double deviation = std::sqrt(noise / (4 * std::numbers::pi)) / reach;
   const double least = std::max(options.deviations * deviation, options.least_vox * voxel);
-  const std::vector<std::vector<int>> closed = closed_patches(network);
   for (Eigen::Index k = 0; k < n; ++k) {
     const std::size_t r = at(mesh.regions[at(k)]);
-    const bool refinable = network.regions[r].kind == RegionKind::kBody || !closed[r].empty();
-    if (!refinable || excluded[r] || !(wall.weight(k) > 0)) continue;
+    if (excluded[r] || !(wall.weight(k) > 0)) continue;
     if (!(std::abs(found.mean_mm(k)) > least)) continue;
     found.large[at(k)] = found.regions[r] = 1;
     found.amounts_mm3[r] += std::abs(found.mean_mm(k)) * smoother.mass_mm2()(k);

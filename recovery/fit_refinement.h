@@ -15,7 +15,7 @@ struct ResidualOptions {
   double half_window_vox = 0.75;
 };
 
-// Nodes of bodies and closed surfaces whose wall lies significantly elsewhere.
+// Nodes whose wall lies significantly elsewhere.
 struct LargeResiduals {
   Eigen::VectorXd mean_mm;          // residual along the normal, averaged
   std::vector<char> large;          // of each node
@@ -27,8 +27,7 @@ struct LargeResiduals {
   void leave_out(const FitMesh& mesh, int region);
 };
 
-// Measures the wall from where the mesh is. Regions with `excluded` set are not looked at, nor are
-// junctions, whose patches get no more freedom.
+// Measures the wall from where the mesh is. Regions with `excluded` set are not looked at.
 LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& network,
                                const FitMesh& mesh, MeshSmoother& smoother, const WallGreys& greys,
                                const std::vector<char>& excluded,
@@ -40,9 +39,9 @@ Eigen::VectorXd share_around(const std::vector<char>& marks, MeshSmoother& smoot
                              double around_mm);
 
 // More freedom where residuals are large: spans of bodies are halved, down to `shortest_mm`;
-// closed surfaces get four patches for each, unless patches would be shorter than four times that.
-// The surfaces are the same; patches keep their numbers. The names of the regions that got any.
-// `share` is that of each node's move that is to be taken.
+// closed surfaces get four patches for each, unless patches would be shorter than four times that;
+// junctions get none. The surfaces are the same; patches keep their numbers. The names of the
+// regions that got any. `share` is that of each node's move that is to be taken.
 struct RefinedNetwork {
   SurfaceNetwork network;
   std::vector<std::string> regions;
