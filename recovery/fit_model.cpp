@@ -9,6 +9,7 @@
 
 #include "recovery/closed_surface.h"
 #include "recovery/fit_capture.h"
+#include "recovery/fit_reduction.h"
 #include "recovery/fit_rings.h"
 #include "recovery/refit.h"
 

@@ -14,18 +14,12 @@
 #include "kernel/curvature.h"
 #include "modeling/penalised_spline.h"
 #include "recovery/closed_surface.h"
+#include "recovery/fit_body.h"
 #include "recovery/fit_junction.h"
 #include "recovery/fit_rings.h"
 
 namespace angiospline {
 namespace {
-
-constexpr int kPerPatch = 5;
-constexpr double kRidge = 1e-7;  // of the mean diagonal: spans without nodes stay as they are
-// Of the mean diagonal, on second differences of a body's rows: the first that does not fold.
-constexpr std::array<double, 4> kFairness{3e-4, 3e-3, 0.03, 0.3};
-constexpr double kLeastShare = 0.125;   // of a body's way
-constexpr double kLeastJacobian = 0.3;  // of a body, relative to what it was
 
 std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
@@ -35,22 +29,6 @@ struct RingSample {
   Vec3 move = Vec3::Zero();
   double weight = 1.0;
 };
-
-// Row of the ring's points that do not vanish at `place`: six, cyclically from 5 * patch.
-std::pair<int, Eigen::Matrix<double, 6, 1>> ring_functions(double place, int patches) {
-  static const KnotVector knots = KnotVector::bezier(5);
-  const int patch = std::min(static_cast<int>(place), patches - 1);
-  return {kPerPatch * patch, basis_at(knots, place - patch, 0).values.row(0).transpose().head<6>()};
-}
-
-Eigen::VectorXd ring_row(const StripRing& ring, const Eigen::MatrixXd& basis, double place) {
-  const auto [first, values] = ring_functions(place, static_cast<int>(ring.patches.size()));
-  Eigen::VectorXd row = Eigen::VectorXd::Zero(basis.cols());
-  for (int k = 0; k < 6; ++k) {
-    row += values(k) * basis.row((first + k) % ring.points()).transpose();
-  }
-  return row;
-}
 
 // The moves of a ring's points nearest to the samples.
 Points3 fit_ring(const StripRing& ring, const std::vector<RingSample>& samples) {
@@ -66,12 +44,6 @@ Points3 fit_ring(const StripRing& ring, const std::vector<RingSample>& samples) 
   return (basis * A.ldlt().solve(b)).transpose();
 }
 
-// A body between rows that are given.
-struct BodyFit {
-  Points3 points;      // row by row
-  double share = 1.0;  // of the way that it could go without folding
-};
-
 class Mover {
  public:
   Mover(const SurfaceNetwork& network, const FitMesh& mesh, const Eigen::VectorXd& displacement)
@@ -79,16 +51,17 @@ class Mover {
         mesh_(mesh),
         displacement_(displacement),
         normals_(moved_normals(mesh, displacement)),
-        mass_(MeshSmoother(mesh).mass_mm2()),
+        wall_{mesh, displacement, MeshSmoother(mesh).mass_mm2(), {}},
         rings_(strip_rings(network)),
-        ring_of_(network.patches.size(), -1),
-        nodes_of_(network.patches.size()) {
+        ring_of_(network.patches.size(), -1) {
+    wall_.nodes_of.resize(network.patches.size());
     for (std::size_t r = 0; r < rings_.size(); ++r) {
       for (std::size_t k = 0; k < rings_[r].patches.size(); ++k) {
         ring_of_[at(rings_[r].patches[k])] = static_cast<int>(r);
       }
     }
-    for (int k = 0; k < mesh.size(); ++k) nodes_of_[at(mesh.origins[at(k)].patch)].push_back(k);
+    for (int k = 0; k < mesh.size(); ++k)
+      wall_.nodes_of[at(mesh.origins[at(k)].patch)].push_back(k);
   }
 
   Result<MovedNetwork> run(const Progress& progress) {
@@ -115,7 +88,6 @@ class Mover {
     const std::vector<int>& patches = rings_[at(ring_of_[at(patch)])].patches;
     return static_cast<int>(std::find(patches.begin(), patches.end(), patch) - patches.begin());
   }
-  Vec3 move_of(int node) const { return displacement_(node) * mesh_.nodes[at(node)].normal; }
 
   // ---- openings
 
@@ -167,12 +139,12 @@ class Mover {
     const Patch& patch = old_.patches[at(from.patch)];
     const double end = from.side == PatchSide::kU0 ? patch.u.first() : patch.u.last();
     const int position = position_in_ring(to.patch);
-    for (const int node : nodes_of_[at(from.patch)]) {
+    for (const int node : wall_.nodes_of[at(from.patch)]) {
       const Vec2& uv = mesh_.origins[at(node)].uv;
       if (uv.x() != end || uv.y() < from.from || uv.y() > from.to) continue;
       const double s = (uv.y() - from.from) / (from.to - from.from);
       const double t = to.from + (reversed ? 1 - s : s) * (to.to - to.from);
-      samples.push_back({position + t, move_of(node), 1.0});
+      samples.push_back({position + t, wall_.move_of(node), 1.0});
     }
   }
 
@@ -214,7 +186,7 @@ class Mover {
       }
     }
     return std::any_of(patches.begin(), patches.end(), [&](int p) {
-      const std::vector<int>& nodes = nodes_of_[at(p)];
+      const std::vector<int>& nodes = wall_.nodes_of[at(p)];
       return std::any_of(nodes.begin(), nodes.end(), [&](int k) { return displacement_(k) != 0; });
     });
   }
@@ -250,18 +222,18 @@ class Mover {
   std::vector<PatchSample> samples_on(const std::vector<int>& patches) const {
     std::vector<PatchSample> samples;
     for (const int patch : patches) {
-      const std::vector<int>& nodes = nodes_of_[at(patch)];
+      const std::vector<int>& nodes = wall_.nodes_of[at(patch)];
       double area = 0;
-      for (const int node : nodes) area += mass_(node);
+      for (const int node : nodes) area += wall_.mass_mm2(node);
       for (const int node : nodes) {
         PatchSample s;
         s.patch = patch;
         s.uv = mesh_.origins[at(node)].uv;
         s.point_mm = mesh_.nodes[at(node)].point_mm;
         s.normal = mesh_.nodes[at(node)].normal;
-        s.move_mm = move_of(node);
+        s.move_mm = wall_.move_of(node);
         s.moved_normal = normals_.col(node);
-        s.weight = mass_(node) / area;
+        s.weight = wall_.mass_mm2(node) / area;
         samples.push_back(s);
       }
     }
@@ -312,8 +284,8 @@ class Mover {
     std::atomic<std::size_t> done{0};
     tbb::parallel_for(std::size_t{0}, rings_.size(), [&](std::size_t r) {
       if (!is_body(rings_[r]) || progress.should_stop()) return;
-      fits[r] = fit_body(rings_[r], result.network.control_points_mm, free_start[r] != 0,
-                         free_end[r] != 0);
+      fits[r] = fit_body(old_, wall_, rings_[r], result.network.control_points_mm,
+                         free_start[r] != 0, free_end[r] != 0);
       progress.at("bodies", static_cast<double>(++done) / static_cast<double>(rings_.size()));
     });
     for (std::size_t r = 0; r < rings_.size(); ++r) {
@@ -332,181 +304,6 @@ class Mover {
               : "its wall would fold";
       result.held.push_back({old_.regions[at(ring.region)].name, why});
     }
-  }
-
-  BodyFit fit_body(const StripRing& ring, const Points3& pool, bool free_start,
-                   bool free_end) const {
-    // Moves of the rows that are given.
-    const int rows = ring.rows(), n = ring.points();
-    const auto end_move = [&](int row) {
-      Points3 moves(3, n);
-      for (int c = 0; c < n; ++c) {
-        moves.col(c) =
-            pool.col(ring.columns(row, c)) - old_.control_points_mm.col(ring.columns(row, c));
-      }
-      return moves;
-    };
-    const Points3 start = end_move(0), end = end_move(rows - 1);
-    const int first = free_start ? 1 : 2;
-    const int last = free_end ? rows - 2 : rows - 3;
-    Points3 moves = Points3::Zero(3, static_cast<Eigen::Index>(rows) * n);
-    for (int i = 0; i < first; ++i) moves.middleCols(i * n, n) = start;
-    for (int i = last + 1; i < rows; ++i) moves.middleCols(i * n, n) = end;
-    BodyFit fit;
-    const Points3 given = moves;
-    const auto attempt = [&](double share, double fairness) {
-      moves = given;
-      if (last >= first) solve_rows(ring, first, last, share, fairness, moves);
-      fit.points = old_net(ring) + moves;
-      fit.share = share;
-      return !folded(ring, fit.points);
-    };
-    for (const double fairness : kFairness) {
-      if (attempt(1.0, fairness)) return fit;
-    }
-    for (double share = 0.5; share >= kLeastShare; share /= 2) {
-      if (attempt(share, kFairness.back())) return fit;
-    }
-    // Only the ends move; their moves die out over the rows between.
-    for (int i = first; i <= last; ++i) {
-      const double w = static_cast<double>(i) / (rows - 1);
-      const double fade_start = std::max(0.0, 1 - 3 * w), fade_end = std::max(0.0, 3 * w - 2);
-      moves.middleCols(i * n, n) = fade_start * start + fade_end * end;
-    }
-    fit.points = old_net(ring) + moves;
-    fit.share = 0.0;
-    return fit;
-  }
-
-  Points3 old_net(const StripRing& ring) const {
-    Points3 net(3, static_cast<Eigen::Index>(ring.rows()) * ring.points());
-    for (int i = 0; i < ring.rows(); ++i) {
-      for (int c = 0; c < ring.points(); ++c) {
-        net.col(i * ring.points() + c) = old_.control_points_mm.col(ring.columns(i, c));
-      }
-    }
-    return net;
-  }
-
-  // Least squares over rows first .. last, all other rows of `moves` given. Banded: rows of the net
-  // are six apart at most.
-  void solve_rows(const StripRing& ring, int first, int last, double share, double fairness,
-                  Points3& moves) const {
-    const Eigen::MatrixXd basis = ring.basis();
-    const Eigen::Index d = basis.cols();
-    const Eigen::Index size = d * (last - first + 1);
-    SymmetricBand A = SymmetricBand::Zero(std::min(size, 6 * d), size);
-    Eigen::MatrixXd b = Eigen::MatrixXd::Zero(size, 3);
-    for (std::size_t k = 0; k < ring.patches.size(); ++k) {
-      for (const int node : nodes_of_[at(ring.patches[k])]) {
-        const Vec2& uv = mesh_.origins[at(node)].uv;
-        const BasisValues bu = basis_at(ring.u, uv.x(), 0);
-        const auto [c0, bv] =
-            ring_functions(static_cast<double>(k) + uv.y(), static_cast<int>(ring.patches.size()));
-        const Eigen::VectorXd around = ring_row(ring, basis, static_cast<double>(k) + uv.y());
-        Vec3 value = share * move_of(node);
-        Eigen::VectorXd row = Eigen::VectorXd::Zero(6 * d);
-        Eigen::Index from = -1;
-        int parts = 0;
-        for (int i = 0; i < 6; ++i) {
-          const int r = bu.first + i;
-          const double w = bu.values(0, i);
-          if (r >= first && r <= last) {
-            if (from < 0) from = d * (r - first);
-            row.segment(d * parts++, d) = w * around;
-          } else {
-            for (int j = 0; j < 6; ++j) {
-              value -= w * bv(j) * moves.col(r * ring.points() + (c0 + j) % ring.points());
-            }
-          }
-        }
-        if (from < 0) continue;
-        const Eigen::Index count = d * parts;
-        for (Eigen::Index x = 0; x < count; ++x) {
-          const double wx = mass_(node) * row(x);
-          if (wx == 0) continue;
-          for (Eigen::Index y = x; y < count; ++y) A(y - x, from + x) += wx * row(y);
-          b.row(from + x) += wx * value.transpose();
-        }
-      }
-    }
-    add_fairness(ring, first, last, basis, fairness, moves, A, b);
-    A.row(0).array() += kRidge * A.row(0).mean() + 1e-300;
-    if (!factorise_band(A)) return;
-    solve_band(A, b);
-    for (int i = first; i <= last; ++i) {
-      moves.middleCols(i * ring.points(), ring.points()) =
-          (basis * b.middleRows(d * (i - first), d)).transpose();
-    }
-  }
-
-  // Second differences of the moves from row to row: where spans have hardly more nodes than rows,
-  // nothing else keeps rows from swinging.
-  static void add_fairness(const StripRing& ring, int first, int last, const Eigen::MatrixXd& basis,
-                           double fairness, const Points3& moves, SymmetricBand& A,
-                           Eigen::MatrixXd& b) {
-    const Eigen::Index d = basis.cols();
-    const double weight = fairness * A.row(0).mean();
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> to_numbers(basis);
-    const auto given = [&](int row) -> Eigen::MatrixXd {
-      return to_numbers.solve(
-          moves.middleCols(row * ring.points(), ring.points()).transpose().eval());
-    };
-    constexpr std::array<double, 3> kDifference{1, -2, 1};
-    for (int middle = std::max(1, first - 1); middle <= std::min(ring.rows() - 2, last + 1);
-         ++middle) {
-      Eigen::MatrixXd known = Eigen::MatrixXd::Zero(d, 3);
-      for (int k = 0; k < 3; ++k) {
-        const int row = middle - 1 + k;
-        if (row < first || row > last) known += kDifference[at(k)] * given(row);
-      }
-      for (int k = 0; k < 3; ++k) {
-        const int row = middle - 1 + k;
-        if (row < first || row > last) continue;
-        b.middleRows(d * (row - first), d) -= weight * kDifference[at(k)] * known;
-        for (int l = k; l < 3; ++l) {
-          if (middle - 1 + l > last) continue;
-          A.row(d * (l - k)).segment(d * (row - first), d).array() +=
-              weight * kDifference[at(k)] * kDifference[at(l)];
-        }
-      }
-    }
-  }
-
-  // Whether the least Su x Sv against the old normal, over its mean, falls too far.
-  bool folded(const StripRing& ring, const Points3& net) const {
-    double before = 1, after = 1, sum_before = 0, sum_after = 0;
-    std::vector<std::pair<double, double>> areas;
-    const int n = ring.points();
-    for (std::size_t k = 0; k < ring.patches.size(); ++k) {
-      Points3 control(3, static_cast<Eigen::Index>(ring.rows()) * 6);
-      for (int i = 0; i < ring.rows(); ++i) {
-        for (int j = 0; j < 6; ++j) {
-          control.col(i * 6 + j) = net.col(i * n + (kPerPatch * static_cast<int>(k) + j) % n);
-        }
-      }
-      const BSplineSurface<3> old = patch_surface(old_, ring.patches[k]);
-      const BSplineSurface<3> moved(ring.u, old.v(), control);
-      const std::vector<double> breaks = ring.u.breakpoints();
-      for (std::size_t s = 0; s + 1 < breaks.size(); ++s) {
-        for (const double t : {0.0, 0.5}) {
-          const double u = breaks[s] + t * (breaks[s + 1] - breaks[s]);
-          for (const double v : {0.0, 0.25, 0.5, 0.75}) {
-            const Vec3 normal = normal_vector(old, u, v);
-            areas.emplace_back(normal.norm(), normal_vector(moved, u, v).dot(normal.normalized()));
-            sum_before += areas.back().first;
-            sum_after += areas.back().second;
-          }
-        }
-      }
-    }
-    if (!(sum_after > 0)) return true;
-    const double count = static_cast<double>(areas.size());
-    for (const auto& [one, other] : areas) {
-      before = std::min(before, one * count / sum_before);
-      after = std::min(after, other * count / sum_after);
-    }
-    return after < kLeastJacobian * before;
   }
 
   // ---- rims
@@ -538,10 +335,9 @@ class Mover {
   const FitMesh& mesh_;
   const Eigen::VectorXd& displacement_;
   Points3 normals_;
-  Eigen::VectorXd mass_;
+  WallMoves wall_;
   std::vector<StripRing> rings_;
-  std::vector<int> ring_of_;                // of each patch, or -1
-  std::vector<std::vector<int>> nodes_of_;  // nodes whose origin is in each patch
+  std::vector<int> ring_of_;  // of each patch, or -1
 };
 
 }  // namespace

@@ -1,12 +1,15 @@
 // The patches around one opening or one body as rings of control points.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
 #include "modeling/surface_network.h"
 
 namespace angiospline {
+
+inline constexpr int kPerPatch = 5;  // control points of a quintic Bezier patch around a ring
 
 // Patches side by side that close on themselves: kV1 of each meets kV0 of the next. Row i of the
 // ring is control row i (along u) of all of them, five points a patch, cyclically. In a body rows
@@ -28,9 +31,20 @@ struct StripRing {
   Eigen::MatrixXd basis() const;
 };
 
+// The functions along a ring that do not vanish at `place`, patch number + v: six, cyclically from
+// the number that comes first.
+std::pair<int, Eigen::Matrix<double, 6, 1>> ring_functions(double place, int patches);
+
+// The ring's value there as a row over the numbers of `basis` (StripRing::basis).
+Eigen::VectorXd ring_row(const StripRing& ring, const Eigen::MatrixXd& basis, double place);
+
 // All rings of the network, in the order of their first patches. Patches that are not quintic and
 // Bezier in v, or do not close into a ring, are in none.
 std::vector<StripRing> strip_rings(const SurfaceNetwork& network);
+
+// Gives the ring's patches these knots along u and rows of columns, numbered as in StripRing.
+void set_rows(SurfaceNetwork& network, const StripRing& ring, const KnotVector& u,
+              const Eigen::MatrixXi& columns);
 
 // Without the pool columns that nothing uses; the others in the order of their use.
 SurfaceNetwork compacted(SurfaceNetwork network);
@@ -43,12 +57,5 @@ SurfaceNetwork with_finer_bodies(const SurfaceNetwork& network, double radii);
 // its knots' domain. Only bodies may have any. Pool columns are numbered anew.
 SurfaceNetwork with_knots_added(const SurfaceNetwork& network, const std::vector<StripRing>& rings,
                                 const std::vector<std::vector<double>>& added);
-
-// Bodies over the length of their axes, cut across it and fitted anew with the fewest equal spans
-// that leave every place of them within the tolerance along the normal; one that would take as many
-// as it has stays as it is. End rows stay; tangent planes there contain the axis if they did, and
-// the relations between neighbouring patches hold in every row: tangent planes stay common. Pool
-// columns are numbered anew. Requires a positive tolerance.
-SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_mm);
 
 }  // namespace angiospline

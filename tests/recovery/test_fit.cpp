@@ -10,6 +10,7 @@
 #include "recovery/fit_axes.h"
 #include "recovery/fit_capture.h"
 #include "recovery/fit_model.h"
+#include "recovery/fit_reduction.h"
 #include "recovery/fit_rings.h"
 #include "recovery/phantom.h"
 #include "recovery/rasterize.h"
