@@ -42,6 +42,10 @@ PointIndex::PointIndex(Points3 points) {
   tree_ = std::make_unique<const Tree>(std::move(points));
 }
 
+PointIndex::PointIndex(const std::vector<Vec3>& points)
+    : PointIndex(Points3(Eigen::Map<const Points3>(points.empty() ? nullptr : points.front().data(),
+                                                   3, std::ssize(points)))) {}
+
 PointIndex::~PointIndex() = default;
 
 NearestPoint PointIndex::nearest(const Vec3& place) const {
@@ -49,6 +53,15 @@ NearestPoint PointIndex::nearest(const Vec3& place) const {
   double squared = 0;
   tree_->index.knnSearch(place.data(), 1, &point, &squared);
   return {static_cast<Eigen::Index>(point), std::sqrt(squared)};
+}
+
+std::array<NearestPoint, 2> PointIndex::nearest_two(const Vec3& place) const {
+  EXPECTS(tree_->columns.points.cols() > 1);
+  std::array<std::size_t, 2> points{};
+  std::array<double, 2> squared{};
+  tree_->index.knnSearch(place.data(), 2, points.data(), squared.data());
+  return {NearestPoint{static_cast<Eigen::Index>(points[0]), std::sqrt(squared[0])},
+          NearestPoint{static_cast<Eigen::Index>(points[1]), std::sqrt(squared[1])}};
 }
 
 }  // namespace angiospline

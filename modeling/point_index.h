@@ -1,7 +1,9 @@
 // Which of many points is nearest to a place.
 #pragma once
 
+#include <array>
 #include <memory>
+#include <vector>
 
 #include "base/vector.h"
 
@@ -17,9 +19,11 @@ struct NearestPoint {
 class PointIndex {
  public:
   explicit PointIndex(Points3 points);
+  explicit PointIndex(const std::vector<Vec3>& points);
   ~PointIndex();
 
   NearestPoint nearest(const Vec3& place) const;
+  std::array<NearestPoint, 2> nearest_two(const Vec3& place) const;  // of two points or more
 
  private:
   struct Tree;

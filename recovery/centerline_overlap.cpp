@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-#include <nanoflann.hpp>
+#include "modeling/point_index.h"
 
 namespace angiospline {
 namespace {
@@ -16,20 +16,7 @@ struct Samples {
   std::vector<Vec3> points;
   std::vector<double> radii;
   std::vector<double> lengths;  // that each point stands for
-
-  // What nanoflann wants of a point set.
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t k, std::size_t axis) const {
-    return points[k][static_cast<Eigen::Index>(axis)];
-  }
-  template <typename B>
-  bool kdtree_get_bbox(B&) const {
-    return false;
-  }
 };
-
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Samples>,
-                                                 Samples, 3, std::size_t>;
 
 Samples sampled(const CenterlineTree& tree, double step_mm) {
   Samples out;
@@ -63,18 +50,6 @@ double step_for(const CenterlineTree& truth, double length_mm) {
   return std::max(0.25 * radius, length_mm / kMostPoints);
 }
 
-struct Nearest {
-  std::size_t point;
-  double distance_mm;
-};
-
-Nearest nearest(const Tree& tree, const Vec3& point) {
-  std::size_t at = 0;
-  double squared = 0;
-  tree.knnSearch(point.data(), 1, &at, &squared);
-  return {at, std::sqrt(squared)};
-}
-
 }  // namespace
 
 CenterlineOverlap centerline_overlap(const CenterlineTree& truth, const CenterlineTree& result) {
@@ -90,16 +65,15 @@ CenterlineOverlap centerline_overlap(const CenterlineTree& truth, const Centerli
   }
   const double step = step_for(truth, both_mm);
   const Samples t = sampled(truth, step), r = sampled(result, step);
-  const nanoflann::KDTreeSingleIndexAdaptorParams leaf(16);
-  const Tree near_truth(3, t, leaf), near_result(3, r, leaf);
+  const PointIndex near_truth(t.points), near_result(r.points);
   double found_mm = 0, correct_mm = 0, moment = 0;
   for (std::size_t k = 0; k < t.points.size(); ++k)
-    if (nearest(near_result, t.points[k]).distance_mm <= t.radii[k]) found_mm += t.lengths[k];
+    if (near_result.nearest(t.points[k]).distance <= t.radii[k]) found_mm += t.lengths[k];
   for (std::size_t k = 0; k < r.points.size(); ++k) {
-    const Nearest n = nearest(near_truth, r.points[k]);
-    if (n.distance_mm > t.radii[n.point]) continue;
+    const NearestPoint n = near_truth.nearest(r.points[k]);
+    if (n.distance > t.radii[static_cast<std::size_t>(n.point)]) continue;
     correct_mm += r.lengths[k];
-    moment += r.lengths[k] * n.distance_mm;
+    moment += r.lengths[k] * n.distance;
   }
   // Over the samples' own sums, so that all of it is exactly 1.
   const double t_mm = std::accumulate(t.lengths.begin(), t.lengths.end(), 0.0);

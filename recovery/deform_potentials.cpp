@@ -6,27 +6,13 @@
 #include <numbers>
 
 #include <fmt/format.h>
-#include <nanoflann.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "modeling/point_index.h"
+
 namespace angiospline {
 namespace {
-
-struct Columns {
-  const Points3& points;
-  // What nanoflann wants of a point set.
-  std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(points.cols()); }
-  double kdtree_get_pt(std::size_t i, std::size_t k) const {
-    return points(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i));
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Columns>,
-                                                 Columns, 3, std::size_t>;
 
 // Rounding of two distances and of a path, as a share of them.
 constexpr double kRounding = 1e-12;
@@ -49,20 +35,16 @@ EdgePoints edge_points(const EdgeField& field, const ImageGrid& grid) {
 }
 
 void NearestNodes::ask(const Points3& nodes, const std::vector<int>& which) {
-  const Columns columns{nodes};
-  const Tree tree(3, columns, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  const PointIndex index(nodes);
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, which.size(), 256),
       [&](const tbb::blocked_range<std::size_t>& r) {
         for (std::size_t k = r.begin(); k != r.end(); ++k) {
           const int p = which[k];
-          const Vec3 at = points_.col(p);
-          std::size_t index[2] = {};
-          double squared[2] = {};
-          tree.knnSearch(at.data(), 2, index, squared);
-          const double first = std::sqrt(squared[0]), second = std::sqrt(squared[1]);
+          const auto [near, next] = index.nearest_two(points_.col(p));
+          const double first = near.distance, second = next.distance;
           const double gap = second - first - kRounding * (first + second + travelled_);
-          nearest_[static_cast<std::size_t>(p)] = static_cast<int>(index[0]);
+          nearest_[static_cast<std::size_t>(p)] = static_cast<int>(near.point);
           good_until_[static_cast<std::size_t>(p)] = travelled_ + std::max(0.0, gap) / 2;
         }
       });

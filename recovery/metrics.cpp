@@ -1,31 +1,23 @@
 #include "recovery/metrics.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
 
 #include <fmt/format.h>
-#include <nanoflann.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+
+#include "modeling/point_index.h"
 
 namespace angiospline {
 namespace {
 
 // Centres of the faces of a mask, in mm along the axes of its grid, and their areas.
 struct Faces {
-  std::vector<std::array<double, 3>> centres;
+  std::vector<Vec3> centres;
   std::vector<double> areas;
-
-  // What nanoflann wants of a point set.
-  std::size_t kdtree_get_point_count() const { return centres.size(); }
-  double kdtree_get_pt(std::size_t k, std::size_t axis) const { return centres[k][axis]; }
-  template <typename B>
-  bool kdtree_get_bbox(B&) const {
-    return false;
-  }
 };
 
 Faces faces_of(const Mask& mask) {
@@ -43,8 +35,9 @@ Faces faces_of(const Mask& mask) {
             Voxel n{x, y, z};
             n[axis] += step;
             if (grid.contains(n) && mask[n] != 0) continue;
-            std::array<double, 3> centre{x * s[0], y * s[1], z * s[2]};
-            centre[axis] += 0.5 * step * s[static_cast<Eigen::Index>(axis)];
+            Vec3 centre(x * s[0], y * s[1], z * s[2]);
+            const auto across = static_cast<Eigen::Index>(axis);
+            centre[across] += 0.5 * step * s[across];
             out.centres.push_back(centre);
             out.areas.push_back(areas[axis]);
           }
@@ -52,19 +45,13 @@ Faces faces_of(const Mask& mask) {
   return out;
 }
 
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Faces>, Faces,
-                                                 3, std::size_t>;
-
 // From each face of `from` the distance to the nearest of `to`.
 std::vector<double> distances(const Faces& from, const Faces& to) {
-  const Tree tree(3, to, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  const PointIndex index(to.centres);
   std::vector<double> out(from.centres.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, out.size(), 1024), [&](const auto& range) {
     for (std::size_t k = range.begin(); k != range.end(); ++k) {
-      std::size_t nearest = 0;
-      double squared = 0;
-      tree.knnSearch(from.centres[k].data(), 1, &nearest, &squared);
-      out[k] = std::sqrt(squared);
+      out[k] = index.nearest(from.centres[k]).distance;
     }
   });
   return out;

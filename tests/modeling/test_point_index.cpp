@@ -18,6 +18,11 @@ TEST(PointIndex, FindsWhatLookingAtAllFinds) {
     const NearestPoint found = index.nearest(place);
     EXPECT_EQ(found.point, expected);
     EXPECT_NEAR(found.distance, distance, 1e-14);
+    const auto [first, second] = index.nearest_two(place);
+    EXPECT_EQ(first.point, expected);
+    Eigen::RowVectorXd others = (points.colwise() - place).colwise().norm();
+    others(expected) = 10;
+    EXPECT_NEAR(second.distance, others.minCoeff(), 1e-14);
   }
 }
 
