@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -29,6 +30,10 @@ constexpr double kRadiusPrior = 1.0;
 
 // No radius changes by more than this part of itself plus half its difference to its neighbours.
 constexpr double kRadiusChange = 0.1;
+// And between two of them no curve leaves what lies between by more than this and half their
+// difference.
+constexpr double kRadiusSwing = 0.2;
+constexpr int kFinerSpans = 4;     // for each sample, where radii jump
 constexpr int kRadiusTrials = 24;  // of ever weaker smoothing
 
 constexpr int kRounds = 30;            // of stiffening sharp bends
@@ -181,7 +186,8 @@ struct BranchSmoother::State {
             kDegree,
             uniform(samples.parameters(samples.parameters.size() - 1), span_count(samples)))),
         position(knots, samples.parameters, samples.points, samples.weights),
-        log_radius(knots, samples.parameters, samples.radii.array().log().matrix(),
+        radius_knots(knots),
+        log_radius(radius_knots, samples.parameters, samples.radii.array().log().matrix(),
                    samples.radius_weights) {
     const double mean = samples.radii.mean();
     // Noise of a given size in the tree against curvatures of the order of one over the radius,
@@ -213,24 +219,74 @@ struct BranchSmoother::State {
     return best_grid_position(criteria);
   }
 
-  // Weakens the smoothing of the radii until none changes too much.
-  Eigen::MatrixXd smooth_log_radius(double strength) const {
+  // By how much a smoothed radius breaks its rules, 1 if it just keeps them: no sample changes too
+  // much, and between two samples nothing swings out of what lies between them.
+  double broken_by(const Eigen::MatrixXd& C) const {
     const Eigen::VectorXd y = samples.radii.array().log();
+    const Eigen::VectorXd change = (log_radius.values_at_samples(C).col(0) - y).cwiseAbs();
+    const BSplineCurve<1> log_r(radius_knots, C.transpose());
     const Eigen::Index last = y.size() - 1;
-    Eigen::MatrixXd C;
-    for (int trial = 0; trial < kRadiusTrials; ++trial, strength *= 0.5) {
-      C = log_radius.solve(strength);
-      const Eigen::VectorXd change = (log_radius.values_at_samples(C).col(0) - y).cwiseAbs();
-      bool kept = true;
-      for (Eigen::Index i = 0; i <= last && kept; ++i) {
-        const double before = i > 0 ? std::abs(y(i) - y(i - 1)) : 0.0;
-        const double after = i < last ? std::abs(y(i) - y(i + 1)) : 0.0;
-        kept = samples.radius_weights(i) == 0 ||
-               change(i) <= kRadiusChange + 0.5 * std::max(before, after);
+    double worst = 0;
+    for (Eigen::Index i = 0; i <= last; ++i) {
+      const double before = i > 0 ? std::abs(y(i) - y(i - 1)) : 0.0;
+      const double after = i < last ? std::abs(y(i) - y(i + 1)) : 0.0;
+      if (samples.radius_weights(i) > 0) {
+        worst = std::max(worst, change(i) / (kRadiusChange + 0.5 * std::max(before, after)));
       }
-      if (kept) break;
+      if (i == last || samples.radius_weights(i) == 0 || samples.radius_weights(i + 1) == 0) {
+        continue;
+      }
+      const double allowed = kRadiusSwing + 0.5 * after;
+      for (const double f : {0.25, 0.5, 0.75}) {
+        const double t = (1 - f) * samples.parameters(i) + f * samples.parameters(i + 1);
+        const double value = log_r.at(t)(0);
+        const double out =
+            std::max(value - std::max(y(i), y(i + 1)), std::min(y(i), y(i + 1)) - value);
+        worst = std::max(worst, out / allowed);
+      }
     }
-    return C;
+    return worst;
+  }
+
+  // Weakens the smoothing of the radii until the rules are kept; where radii jump too far for that
+  // the strength is taken that breaks them least.
+  Eigen::MatrixXd smooth_log_radius(double strength, double& least) const {
+    Eigen::MatrixXd best;
+    least = std::numeric_limits<double>::infinity();
+    for (int trial = 0; trial < kRadiusTrials; ++trial, strength *= 0.5) {
+      Eigen::MatrixXd C = log_radius.solve(strength);
+      const double broken = broken_by(C);
+      if (broken < least || best.size() == 0) {
+        least = broken;
+        best = std::move(C);
+      }
+      if (least <= 1) break;
+    }
+    return best;
+  }
+
+  // Radii that jump get spans as fine as their samples: the path's own are half a mean radius long,
+  // and a curve that cannot follow a jump swings on both sides of it.
+  void fit_radii() {
+    double broken = 0;
+    log_radius_coefficients = smooth_log_radius(radius_strength, broken);
+    if (broken <= 1) return;
+    const double spacing = (samples.parameters.tail(samples.parameters.size() - 1) -
+                            samples.parameters.head(samples.parameters.size() - 1))
+                               .minCoeff();
+    const int spans = std::clamp(static_cast<int>(knots.last() / spacing), position.span_count(),
+                                 static_cast<int>(kFinerSpans * samples.parameters.size()));
+    State finer = *this;
+    finer.radius_knots = KnotVector::clamped(kDegree, uniform(knots.last(), spans));
+    finer.log_radius =
+        PenalisedSpline(finer.radius_knots, samples.parameters,
+                        samples.radii.array().log().matrix(), samples.radius_weights);
+    double finer_broken = 0;
+    Eigen::MatrixXd C = finer.smooth_log_radius(radius_strength, finer_broken);
+    if (finer_broken >= broken) return;
+    radius_knots = std::move(finer.radius_knots);
+    log_radius = std::move(finer.log_radius);
+    log_radius_coefficients = std::move(C);
   }
 
   bool is_visible(double t) const {
@@ -250,6 +306,7 @@ struct BranchSmoother::State {
   Samples samples;
   KnotVector knots;
   PenalisedSpline position;
+  KnotVector radius_knots;
   PenalisedSpline log_radius;
   double position_unit = 0;
   double radius_unit = 0;
@@ -262,7 +319,7 @@ struct BranchSmoother::State {
 
 DensePath BranchSmoother::State::dense(const Eigen::MatrixXd& C) const {
   const BSplineCurve<3> curve(knots, C.transpose());
-  const BSplineCurve<1> log_r(knots, log_radius_coefficients.transpose());
+  const BSplineCurve<1> log_r(radius_knots, log_radius_coefficients.transpose());
   const int count = std::max(kDenseSamples * position.span_count(), 128);
   const double step = knots.last() / count;
   DensePath path{Eigen::VectorXd::Zero(count + 1), Eigen::MatrixXd(count + 1, 4),
@@ -346,7 +403,7 @@ BSplineCurve<4> BranchSmoother::State::compressed(const DensePath& dense) const 
 
 Eigen::VectorXd BranchSmoother::State::bends_of_spans(const Eigen::MatrixXd& C) const {
   const BSplineCurve<3> curve(knots, C.transpose());
-  const BSplineCurve<1> log_r(knots, log_radius_coefficients.transpose());
+  const BSplineCurve<1> log_r(radius_knots, log_radius_coefficients.transpose());
   Eigen::VectorXd bends = Eigen::VectorXd::Zero(position.span_count());
   for (int k = 0; k < position.span_count(); ++k) {
     const double a = position.breaks()[static_cast<std::size_t>(k)];
@@ -459,9 +516,10 @@ BranchSmoother::State BranchSmoother::State::reparametrised(const Eigen::MatrixX
   }
   again.knots = KnotVector::clamped(kDegree, uniform(t(t.size() - 1), span_count(again.samples)));
   again.position = PenalisedSpline(again.knots, t, samples.points, samples.weights);
+  again.radius_knots = again.knots;
   again.log_radius =
       PenalisedSpline(again.knots, t, samples.radii.array().log().matrix(), samples.radius_weights);
-  again.log_radius_coefficients = again.smooth_log_radius(radius_strength);
+  again.fit_radii();
   return again;
 }
 
@@ -488,7 +546,7 @@ void BranchSmoother::choose_strengths(double position_of_tree, double radius_of_
       s.position_unit, State::drawn_to(position_of_tree, kPositionPrior, s.position_criteria));
   s.radius_strength = State::strength(
       s.radius_unit, State::drawn_to(radius_of_tree, kRadiusPrior, s.radius_criteria));
-  s.log_radius_coefficients = s.smooth_log_radius(s.radius_strength);
+  s.fit_radii();
 }
 
 CondensedEnds BranchSmoother::condensed_ends() const {

@@ -55,6 +55,34 @@ TEST(SmoothCenterlines, ExactPointsAreFollowed) {
   EXPECT_LT(path.knots().control_point_count(), 40);
 }
 
+// Where two vessels touch, a tracer goes from one to the other through a neck of one voxel.
+TEST(SmoothCenterlines, RadiiThatJumpAreFollowedWithoutSwinging) {
+  const double radii[] = {2.23, 1.67, 1.16, 0.62, 0.31, 0.23, 0.27};
+  PointGraph graph;
+  add_line(graph, 36, -1, [&](double t) {
+    const int i = static_cast<int>(std::lround(35 * t));
+    const double z = i < 7 ? 0.7 * i : 4.2 + 0.3 * (i - 6);
+    return Vec4(0.3 * std::sin(z), 0, z, i < 7 ? radii[i] : 1.9);
+  });
+  const auto smooth = smooth_centerlines(tree_of(graph));
+  ASSERT_TRUE(smooth.has_value());
+  const auto& path = smooth->paths[0];
+  double least = 9;
+  double before = path.at(0.0)(3);
+  bool grows = false;
+  for (int k = 0; k <= 400; ++k) {
+    const double radius = path.at(path.knots().last() * k / 400)(3);
+    EXPECT_LT(radius, 1.2 * 2.23) << k;
+    least = std::min(least, radius);
+    EXPECT_TRUE(grows || radius < 1.02 * before) << k << " on the way to the neck";
+    grows = grows || radius < 0.4;
+    before = radius;
+  }
+  EXPECT_GT(least, 0.1);
+  EXPECT_LT(least, 0.35);
+  EXPECT_NEAR(path.at(path.knots().last())(3), 1.9, 0.1);
+}
+
 TEST(SmoothCenterlines, NoiseIsTakenOutAndTheCurveKept) {
   Random random(7);
   PointGraph graph;
