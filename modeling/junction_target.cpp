@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -332,13 +333,15 @@ Vec3 JunctionTarget::on_ray(const Vec3& w, double longest) const {
 
 double JunctionTarget::others_share(int i, const Vec3& x) const {
   const auto own = static_cast<std::size_t>(i);
-  const Distance mine = capsule(branches_[own], x);
+  std::optional<Distance> mine;
   double sum = 0;
   for (std::size_t j = 0; j < branches_.size(); ++j) {
     if (j == own || j == core_of_[own]) continue;
-    const Distance other = capsule(branches_[j], x);
     const double k = widths_(i, static_cast<Eigen::Index>(j));
-    sum += std::exp(-other.value / k) * (1.01 - agreement(mine, other));
+    if (capsule_value(branches_[j], x) > kNegligible * k) continue;
+    if (!mine) mine = capsule(branches_[own], x);
+    const Distance other = capsule(branches_[j], x);
+    sum += std::exp(-other.value / k) * (1.01 - agreement(*mine, other));
   }
   return sum;
 }

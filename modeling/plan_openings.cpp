@@ -1,6 +1,7 @@
 #include "modeling/plan_openings.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -16,7 +17,8 @@ constexpr double kLeastMargin = 0.3;    // radii
 constexpr double kLeastAngleRad = 1.0 * std::numbers::pi / 180;
 constexpr double kUnitTolerance = 1e-6;  // of a direction's length
 constexpr int kCirclePoints = 24;
-constexpr double kReach = 4;  // largest radii at which directions of offset branches are compared
+constexpr int kHalvings = 18;  // of the way between too near and far enough
+constexpr double kReach = 4;   // largest radii at which directions of offset branches are compared
 constexpr std::size_t kMostBranches = 24;  // what JunctionTarget holds
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -98,33 +100,51 @@ double along_branch(const Vec3& offset, const Vec3& direction, double distance) 
   return rest > 0 ? std::max(0.0, std::sqrt(rest) - back) : 0.0;
 }
 
-double share_around(const JunctionTarget& target, int b, double distance) {
-  const TargetBranch& branch = target.branches()[at(b)];
-  const Vec3 x = branch.direction.unitOrthogonal();
-  const Vec3 y = branch.direction.cross(x);
-  double worst = 0;
-  for (int k = 0; k < kCirclePoints; ++k) {
-    const double phi = 2 * std::numbers::pi * k / kCirclePoints;
-    const Vec3 p = branch.start + distance * branch.direction +
-                   branch.radius * (std::cos(phi) * x + std::sin(phi) * y);
-    worst = std::max(worst, target.others_share(b, p));
+// The circle of a branch at some distance, where the others' share is looked at.
+class OpeningCircle {
+ public:
+  OpeningCircle(const JunctionTarget& target, int b) : target_(target), branch_(b) {
+    const TargetBranch& branch = target.branches()[at(b)];
+    const Vec3 x = branch.direction.unitOrthogonal();
+    const Vec3 y = branch.direction.cross(x);
+    for (int k = 0; k < kCirclePoints; ++k) {
+      const double phi = 2 * std::numbers::pi * k / kCirclePoints;
+      arms_[at(k)] = branch.start + branch.radius * (std::cos(phi) * x + std::sin(phi) * y);
+    }
   }
-  return worst;
-}
+
+  // Whether it is too large anywhere; where it was the last time is looked at first.
+  bool is_too_near(double distance) {
+    const Vec3 way = distance * target_.branches()[at(branch_)].direction;
+    for (int k = 0; k < kCirclePoints; ++k) {
+      const int point = (worst_ + k) % kCirclePoints;
+      if (target_.others_share(branch_, arms_[at(point)] + way) <= kLargestShare) continue;
+      worst_ = point;
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  const JunctionTarget& target_;
+  int branch_;
+  std::array<Vec3, kCirclePoints> arms_;
+  int worst_ = 0;
+};
 
 // The least distance beyond which the others' share is small. Branches diverge,
 // so the share falls once it has begun to; the search comes inward from a
 // distance at which it is certainly small.
 double blend_end(const JunctionTarget& target, int b) {
-  const TargetBranch& branch = target.branches()[at(b)];
-  double far = branch.radius;
-  while (share_around(target, b, far) > kLargestShare) far *= 2;
-  double near = 0;
-  if (far == branch.radius) return far;
-  near = far / 2;
-  for (int k = 0; k < 24; ++k) {
+  OpeningCircle circle(target, b);
+  const double radius = target.branches()[at(b)].radius;
+  double far = radius;
+  while (circle.is_too_near(far)) far *= 2;
+  if (far == radius) return far;
+  double near = far / 2;
+  for (int k = 0; k < kHalvings; ++k) {
     const double middle = (near + far) / 2;
-    (share_around(target, b, middle) > kLargestShare ? near : far) = middle;
+    (circle.is_too_near(middle) ? near : far) = middle;
   }
   return far;
 }
