@@ -35,6 +35,7 @@ constexpr double kNearTarget = 10.0;  // radii of way within which a point finds
 constexpr double kThroat = 0.4;       // of the radius given up: the wall is likely to fold there
 constexpr double kFoldCost = 1e3;     // worse than any departure
 constexpr double kLargestDeparture = 2.0;  // radii as bad as giving up kMostNarrowed of the radius
+constexpr double kLost = 2.0;              // times that: a part of the vessel is cut off
 constexpr double kGoodEnough = 0.5;        // of these two: no other way is looked for
 
 struct Rail {
@@ -360,7 +361,9 @@ Attempt fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end, c
 
   const int samples = static_cast<int>(4 * fit.spans());
   std::vector<Bend> bends = bends_of(curve, samples);
-  Attempt attempt{{curve, tightest(bends), 0.0}, fit.departure(curve).radii / kLargestDeparture};
+  const double departure = fit.departure(curve).radii / kLargestDeparture;
+  Attempt attempt{{curve, tightest(bends), 0.0}, departure * std::max(1.0, departure)};
+  if (departure > kLost) attempt.cost += kFoldCost;
   BodyPath& path = attempt.path;
   if (path.largest_bend <= tightest_bend) return attempt;
   const std::vector<Bend> before = bends;
@@ -373,7 +376,7 @@ Attempt fit_within(const Rail& rail, const PathEnd& start, const PathEnd& end, c
   }
   path.largest_bend = tightest(bends);
   attempt.cost = std::max(attempt.cost, path.narrowed / kMostNarrowed);
-  if (path.narrowed > kThroat && !std::isinf(leave.largest_move)) attempt.cost += kFoldCost;
+  if (path.narrowed > kThroat && departure <= kLost) attempt.cost += kFoldCost;
   return attempt;
 }
 

@@ -28,7 +28,9 @@ inline constexpr double kTightestBend = 0.81;
 
 // Stiffening may move the path by so many radii. If that would narrow the radius by more than half
 // of the share below, or leave the target by more than one radius, other ways are tried (one
-// radius, then ends led in, then any move), and the one that gives up least of either is taken.
+// radius, then ends led in, then any move), and the one that gives up least of either is taken;
+// what cuts off more than four radii of the vessel, or narrows it by more than four tenths, only
+// if nothing else is left.
 inline constexpr double kLargestPathMove = 0.3;
 inline constexpr double kMostNarrowed = 0.1;
 

@@ -148,6 +148,59 @@ TEST(Body, DoesNotFoldInAKink) {
   EXPECT_GT(enclosed_volume_mm3(network), 0);
 }
 
+// A leg, a part of a circle of radius `bend` and a leg, of radius 1.
+Eigen::Matrix4Xd hairpin(double bend, double turn, double leg) {
+  const double whole = 2 * leg + turn * bend;
+  return sampled(
+      [=](double t) {
+        const double s = t * whole;
+        const double angle = std::clamp((s - leg) / bend, 0.0, turn);
+        const double rest = std::max(0.0, s - leg - turn * bend);
+        return Vec4(bend * (1 - std::cos(angle)) + rest * std::sin(turn), 0,
+                    std::min(s, leg) + bend * std::sin(angle) + rest * std::cos(turn), 1);
+      },
+      400);
+}
+
+// Bends tighter than the vessel is thick: the radius gives way in the bend alone, and the vessel
+// goes all its way.
+TEST(BodyPath, AHairpinIsNarrowedInItsBendAndNotCutOff) {
+  int narrowed = 0;
+  for (const double bend : {0.5, 0.7, 0.9, 1.1}) {
+    for (const double turn : {0.5 * kPi, 0.75 * kPi, kPi}) {
+      const double leg = 10;
+      const Eigen::Matrix4Xd target = hairpin(bend, turn, leg);
+      const Eigen::Index last = target.cols() - 1;
+      const BodyPath path = fit_body_path(target, end_of(target, 0), end_of(target, last));
+      std::vector<double> parameters;
+      for (Eigen::Index i = 0; i <= last; ++i) {
+        parameters.push_back(static_cast<double>(i) / static_cast<double>(last));
+      }
+      const std::string which = ::testing::PrintToString(std::pair(bend, turn));
+      EXPECT_LT(departure_from(path.curve, target, parameters).radii, 2.0) << which;
+      narrowed += path.narrowed > 0.1 ? 1 : 0;
+      bool grows = false;
+      double before = 1;
+      for (int k = 0; k <= 1000; ++k) {
+        const double t = k / 1000.0;
+        const double radius = path.curve.at(t)(3);
+        const Vec3 d1 = path.curve.at(t, 1).head<3>();
+        const Vec3 d2 = path.curve.at(t, 2).head<3>();
+        EXPECT_LT(d1.cross(d2).norm() / std::pow(d1.norm(), 3) * radius, 0.85) << which << t;
+        EXPECT_GT(radius, 0.35 * kTightestBend * bend) << which << t;
+        if (std::abs(t - 0.5) * (2 * leg + turn * bend) > 0.5 * turn * bend + 4) {
+          EXPECT_GT(radius, 0.98) << which << t;
+        }
+        // One throat: it narrows, then widens.
+        grows = grows || radius > before + 0.01;
+        EXPECT_TRUE(!grows || radius > before - 0.01) << which << t;
+        before = radius;
+      }
+    }
+  }
+  EXPECT_GE(narrowed, 5);
+}
+
 TEST(Body, JoinedEndsLeaveExactlyAlongTheirTangents) {
   const auto path = [](double t) { return Vec4(12 * t, 2 * std::sin(2 * t), t * t, 1.0); };
   const Eigen::Matrix4Xd target = sampled(path);
