@@ -17,6 +17,7 @@ namespace {
 constexpr double kCapsuleRadii = 0.5;  // length of a capsule
 constexpr int kMostCapsules = 4096;    // of one branch: a hair is cut more coarsely
 constexpr double kReturnRadii = 6.0;   // of way between two places that may overlap
+constexpr double kBackRadii = 2.5;     // of way back to a junction that was left
 constexpr double kShortBranch = 2.0;   // in radii of its junctions: these then are one
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -293,7 +294,7 @@ std::vector<VesselContact> find_contacts(const SmoothedTree& tree, const Overlap
     for (std::size_t k = 0; k < found.size(); ++k) {
       const VesselContact& vessels = found[k].vessels;
       const bool beyond_both = beyond_a[k] && beyond_b[k];
-      const bool comes_back = !own[k] && way_over_radii(tree, vessels) > 0.5 * kReturnRadii;
+      const bool comes_back = !own[k] && way_over_radii(tree, vessels) > 0.5 * kBackRadii;
       if (beyond_both || comes_back) result.push_back(vessels);
     }
   }

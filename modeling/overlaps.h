@@ -23,8 +23,8 @@ struct OverlapOptions {
 // One entry for each pair of branches that overlap, ordered by their indices. Branches that meet at
 // a node (or at nodes joined by a branch no longer than its junctions are wide) overlap there by
 // right: only what lies behind the first gap along both of them counts, and where one that has left
-// their node comes back to the other after a way of more than three diameters, apart from what
-// overlaps there. A branch overlaps itself where it comes back after such a way. Vessels are taken
+// their node comes back to the other after a way of more than 2.5 radii, apart from what overlaps
+// there. A branch overlaps itself where it comes back after three diameters. Vessels are taken
 // as chains of capsules, half a radius long. O(n) for n capsules of vessels that do not pile up, by
 // one grid for each octave of sizes.
 std::vector<Overlap> find_overlaps(const SmoothedTree& tree, const OverlapOptions& options = {});

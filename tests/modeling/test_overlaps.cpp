@@ -114,6 +114,42 @@ TEST(Overlaps, ABranchThatReturnsIntoItsSiblingBesideTheirJunctionIsReportedAndP
   EXPECT_TRUE(find_overlaps(keep_apart(tree), {0.1}).empty());
 }
 
+// Two vessels that touch through a neck of one voxel: right behind it the thick part runs along the
+// other's wall.
+TEST(Overlaps, WhatLiesBehindANeckBesideItsJunctionIsReported) {
+  const auto with_distance = [](double away) {
+    CenterlineTree tree;
+    tree.nodes = {
+        {"in", {-20, 0, 0}}, {"neck", {0, 0, 0}}, {"out", {20, 0, 0}}, {"end", {24, 0, 0}}};
+    tree.inlets = {0};
+    const auto branch = [&](const std::string& name, int from, int to, int count, const auto& at) {
+      CenterlineBranch b{name, from, to, Points3(3, count), Eigen::VectorXd(count)};
+      for (int i = 0; i < count; ++i) {
+        const Vec4 p = at(static_cast<double>(i) / (count - 1));
+        b.points_mm.col(i) = p.head<3>();
+        b.radii_mm(i) = p(3);
+      }
+      tree.branches.push_back(std::move(b));
+    };
+    branch("trunk", 0, 1, 21, [](double t) { return Vec4(-20 + 20 * t, 0, 0, 2.5); });
+    branch("on", 1, 2, 21, [](double t) { return Vec4(20 * t, 0, 0, 2.5); });
+    // Straight down, then along and away.
+    branch("neck", 1, 3, 81, [=](double t) {
+      const double s = 28 * t;
+      const double radius = s < 1 ? 1.0 : s < away ? 0.3 : std::min(2.0, 0.3 + 2 * (s - away));
+      const double x = std::max(0.0, s - away);
+      return Vec4(x, 0, -std::min(s, away) - 0.12 * std::max(0.0, x - 4), radius);
+    });
+    tree.nodes[3].position_mm = tree.branches[2].points_mm.rightCols<1>();
+    return smooth_centerlines(tree).value();
+  };
+  const auto found = find_overlaps(with_distance(4.2));
+  ASSERT_FALSE(found.empty());
+  EXPECT_LT(found.back().at_mm.z(), 0);
+  EXPECT_NEAR(found.back().depth_mm, 0.3, 0.2);
+  EXPECT_TRUE(find_overlaps(with_distance(5.2)).empty());
+}
+
 TEST(Overlaps, ABranchThatCrossesItselfIsReported) {
   CenterlineLine eight{"eight", Points3(3, 120), Eigen::VectorXd::Constant(120, 1.0)};
   for (int i = 0; i < 120; ++i) {
