@@ -84,11 +84,12 @@ int run_size(int branches, const std::vector<std::string>& suffixes) {
   const auto smoothed = smooth_centerlines(*tree);
   if (!smoothed) return complain(smoothed.error());
   row += fmt::format(" {:.3f} |", clock.lap());
-  auto model = seed_smoothed(*smoothed);
-  if (!model) return complain(model.error());
+  auto seeded = seed_with_room(*smoothed);
+  if (!seeded) return complain(seeded.error());
+  Model* const model = &seeded->model;
   model->name = "comb";
   row += fmt::format(" {:.2f} |", clock.lap());
-  const Fidelity fidelity = measure_fidelity(model->network, *smoothed);
+  const Fidelity fidelity = measure_fidelity(model->network, seeded->tree);
   row += fmt::format(" {:.2f} |", clock.lap());
   for (const std::string& suffix : suffixes) {
     if (const auto done = export_model(*model, {folder / ("comb" + suffix)}); !done) {
@@ -155,17 +156,18 @@ void judge(const CenterlineTree& tree, int number, Tally& tally) {
     tally.remarks += fmt::format("  [{}] {}\n", number, text);
   };
   const auto smoothed = smooth_centerlines(tree);
-  auto model = smoothed ? seed_smoothed(*smoothed) : Result<Model>(fail(smoothed.error()));
-  if (!model) {
+  const auto seeded = smoothed ? seed_with_room(*smoothed) : Result<Seeded>(fail(smoothed.error()));
+  if (!seeded) {
     ++tally.refused;
-    remark(model.error().message());
+    remark(seeded.error().message());
     return;
   }
+  const Model* const model = &seeded->model;
   for (const FailedPart& part : model->failed) {
     ++tally.failed_parts;
     remark(part.name + " failed: " + part.why);
   }
-  const Fidelity f = measure_fidelity(model->network, *smoothed);
+  const Fidelity f = measure_fidelity(model->network, seeded->tree);
   const auto solid = make_solid(model->network);
   const auto certificate = solid ? certify(*solid, {}) : Result<Certificate>(fail(solid.error()));
   if (!certificate) {

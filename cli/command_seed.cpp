@@ -51,18 +51,19 @@ int run_seed(const SeedArguments& arguments) {
   options.extend_inlets = arguments.extend_inlets;
   options.extend_outlets = arguments.extend_outlets;
   options.clearance = arguments.clearance;
-  const auto smoothed = smooth_for_seed(*tree, options, console.progress());
+  auto smoothed = smooth_for_seed(*tree, options, console.progress());
   if (!smoothed) return report_error(smoothed.error());
   watch.lap("smooth");
-  auto model = seed_smoothed(*smoothed, options, console.progress());
-  if (!model) return report_error(model.error());
+  auto seeded = seed_with_room(*std::move(smoothed), options, console.progress());
+  if (!seeded) return report_error(seeded.error());
+  Model* const model = &seeded->model;
   model->name = arguments.name.empty()
                     ? std::filesystem::path(arguments.trees.front()).stem().string()
                     : arguments.name;
   watch.lap("model");
   Fidelity fidelity;
   const auto measure = [&] {
-    fidelity = measure_fidelity(model->network, *smoothed);
+    fidelity = measure_fidelity(model->network, seeded->tree);
     watch.lap("fidelity");
   };
   const auto finished = finish_model(*model, paths, arguments.step_schema, console, watch, measure);

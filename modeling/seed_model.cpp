@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <optional>
 
 #include <Eigen/Geometry>
@@ -15,6 +16,7 @@
 #include "modeling/body.h"
 #include "modeling/body_path.h"
 #include "modeling/keep_apart.h"
+#include "modeling/make_room.h"
 #include "modeling/seed_plan.h"
 
 namespace angiospline {
@@ -22,11 +24,15 @@ namespace {
 
 constexpr int kJunctionRounds = 6;  // of building, changing the plan of what failed, building again
 constexpr std::array<double, 3> kForwardRadii{1.0, 2.0, 4.0};  // of the first rounds, each on top
-constexpr int kBendRounds = 4;         // of letting branches bend inside their junctions, at most
+constexpr int kBendRounds = 5;         // of letting branches bend inside their junctions, at most
 constexpr int kFewSettings = 3;        // of a junction inside which branches bend
 constexpr double kReachFarther = 1.6;  // times the distance at which directions are taken
 constexpr double kMergeReach = 6.0;    // radii of branch between junctions that may be merged
 constexpr double kFarFromCenterline = 0.5;  // radii that are worth a warning
+constexpr std::size_t kCrowded = 6;         // branches beyond which a junction of several is cut
+constexpr std::size_t kMayGrow = 5;         // of one that failed and may be merged with another
+constexpr int kRoomRounds = 24;             // of cutting junctions and planning again,
+constexpr int kRoomBuilds = 5;              // and of building what was planned
 constexpr int kMergePasses = 3;             // of merging junctions between which the body folds
 constexpr double kFoldedBody = 0.02;        // Jacobian ratio of a body that counts as folded
 constexpr double kStraightened = 6.0;       // radii of body that may be straightened when it folds
@@ -40,6 +46,8 @@ struct BuiltJunction {
   std::optional<Junction> junction;
   std::optional<Error> error;
 };
+
+using BuiltByName = std::map<std::string, BuiltJunction>;
 
 bool same(const JunctionSpec& a, const JunctionSpec& b) {
   if (a.name != b.name || a.center_mm != b.center_mm || a.branches.size() != b.branches.size()) {
@@ -115,13 +123,47 @@ BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& opt
 class Seeder {
  public:
   Seeder(const SmoothedTree& tree, const SeedOptions& options, const Progress& progress)
-      : tree_(tree), options_(options), progress_(progress), plan_(tree, options.junction) {}
+      : tree_(tree), options_(options), progress_(progress), plan_(tree, options.junction) {
+    find_flow();
+    built_.resize(plan_.nodes().size());
+    built_before_.resize(built_.size());
+  }
+
+  // Junctions of a former plan: those that are planned again as they were are not built again.
+  void reuse(BuiltByName known) {
+    for (std::size_t n = 0; n < built_.size(); ++n) {
+      const auto found = known.find(plan_.nodes()[n].spec.name);
+      if (found != known.end()) built_[n] = std::move(found->second);
+    }
+  }
+  BuiltByName built() {
+    BuiltByName all;
+    for (BuiltJunction& junction : built_) {
+      if (!junction.junction) continue;
+      const std::string name = junction.spec.name;
+      all.emplace(name, std::move(junction));
+    }
+    return all;
+  }
+
+  // Junctions that became one of too many branches, and those of several that could not be
+  // built, or of many only as no fair surface.
+  std::vector<PlannedNode> crowded() const {
+    return merged_nodes([&](std::size_t n) { return plan_.nodes()[n].ends.size() > kCrowded; });
+  }
+  std::vector<PlannedNode> failed() const {
+    return merged_nodes([&](std::size_t n) {
+      const bool many = plan_.nodes()[n].ends.size() > kMayGrow;
+      return !built_[n].junction || (many && !built_[n].junction->fair);
+    });
+  }
 
   Result<Model> run() {
+    plan_.find_bends();
     const SeedPlan unbent = plan_;
-    excluded_.assign(plan_.nodes().size(), 0);
+    refused_.assign(plan_.nodes().size(), 0);
     for (int round = 0; round < kBendRounds; ++round) {
-      bent_ = plan_.bend(excluded_);
+      bent_ = plan_.bend(refused_);
       if (bent_.empty() || build_bent()) break;
       if (progress_.should_stop()) return fail(cancelled("junctions"));
       plan_ = unbent;
@@ -133,7 +175,7 @@ class Seeder {
       if (!build_bodies()) return fail(cancelled("bodies"));
       if (unbend_folded()) {
         plan_ = unbent;
-        bent_ = plan_.bend(excluded_);
+        bent_ = plan_.bend(refused_);
         continue;
       }
       if (merges++ == kMergePasses || !merge_folded()) break;
@@ -160,15 +202,42 @@ class Seeder {
   }
 
  private:
+  template <typename Predicate>
+  std::vector<PlannedNode> merged_nodes(const Predicate& is_wanted) const {
+    std::vector<PlannedNode> nodes;
+    for (std::size_t n = 0; n < built_.size(); ++n) {
+      const PlannedNode& node = plan_.nodes()[n];
+      if (node.is_junction() && !node.absorbed.empty() && is_wanted(n)) nodes.push_back(node);
+    }
+    return nodes;
+  }
+
   // ---- junctions
 
-  // Where branches bend inside their junctions these are built; what fails is excluded. Whether
+  // Whether this node's junction, as it is planned now, has been built before; then it is there.
+  bool is_built(int n) {
+    const JunctionSpec& wanted = plan_.nodes()[index(n)].spec;
+    BuiltJunction& now = built_[index(n)];
+    if (same(now.spec, wanted)) return true;
+    std::vector<BuiltJunction>& before = built_before_[index(n)];
+    const auto found = std::find_if(before.begin(), before.end(), [&](const BuiltJunction& built) {
+      return same(built.spec, wanted);
+    });
+    if (found != before.end()) {
+      std::swap(now, *found);
+      return true;
+    }
+    if (now.junction) before.push_back(std::move(now));
+    now = {};
+    return false;
+  }
+
+  // Where branches bend inside their junctions these are built; what fails is refused. Whether
   // nothing did.
   bool build_bent() {
-    built_.resize(plan_.nodes().size());
     std::vector<int> work;
     for (const int n : bent_) {
-      if (!same(built_[index(n)].spec, plan_.nodes()[index(n)].spec)) work.push_back(n);
+      if (!is_built(n)) work.push_back(n);
     }
     tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
       built_[index(work[k])] =
@@ -177,7 +246,7 @@ class Seeder {
     bool all = true;
     for (const int n : bent_) {
       if (built_[index(n)].junction) continue;
-      excluded_[index(n)] = 1;
+      ++refused_[index(n)];
       all = false;
     }
     return all;
@@ -190,7 +259,7 @@ class Seeder {
       const PlannedBranch& branch = plan_.branches()[index(b)];
       for (const int n : {branch.from, branch.to}) {
         if (std::find(bent_.begin(), bent_.end(), n) == bent_.end()) continue;
-        excluded_[index(n)] = 1;
+        ++refused_[index(n)];
         any = true;
       }
     }
@@ -198,12 +267,11 @@ class Seeder {
   }
 
   bool build_junctions() {
-    built_.resize(plan_.nodes().size());
     for (int round = 0; round < kJunctionRounds; ++round) {
       std::vector<int> work;
       for (int n = 0; n < static_cast<int>(plan_.nodes().size()); ++n) {
         const PlannedNode& node = plan_.nodes()[index(n)];
-        if (node.is_junction() && !same(built_[index(n)].spec, node.spec)) work.push_back(n);
+        if (node.is_junction() && !is_built(n)) work.push_back(n);
       }
       std::atomic<std::size_t> done{0};
       tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
@@ -224,7 +292,9 @@ class Seeder {
   bool change_failed(int round) {
     bool changed = false;
     for (int n = 0; n < static_cast<int>(built_.size()); ++n) {
-      if (!plan_.nodes()[index(n)].is_junction() || built_[index(n)].junction) continue;
+      const PlannedNode& node = plan_.nodes()[index(n)];
+      if (!node.is_junction() || built_[index(n)].junction) continue;
+      if (!node.absorbed.empty() && node.ends.size() > kMayGrow) continue;  // it is to be cut
       if (index(round) < kForwardRadii.size()) {
         plan_.move_forward(n, kForwardRadii[index(round)]);
         changed = true;
@@ -594,7 +664,6 @@ class Seeder {
     return outcome;
   }
 
- public:
   // Which nodes lie in a component with an inlet: only there is the direction of flow known.
   void find_flow() {
     const std::vector<int> component = components_of_nodes(tree_.tree);
@@ -603,15 +672,15 @@ class Seeder {
     for (const int c : component) flow_.push_back(fed[index(c)]);
   }
 
- private:
   const SmoothedTree& tree_;
   const SeedOptions& options_;
   const Progress& progress_;
   SeedPlan plan_;
-  std::vector<char> excluded_;        // nodes inside which branches do not bend
+  std::vector<int> refused_;          // ways in which branches do not bend, of each node
   std::vector<int> bent_;             // and those inside which they do
   std::vector<BuiltJunction> built_;  // one for each node of the plan
-  std::vector<int> number_;           // of each node's junction, or -1
+  std::vector<std::vector<BuiltJunction>> built_before_;  // for other plans of it
+  std::vector<int> number_;                               // of each node's junction, or -1
   std::vector<char> flow_;
   std::vector<Junction> junctions_;
   std::vector<BodyPiece> pieces_;
@@ -625,32 +694,76 @@ class Seeder {
 
 Result<Model> seed_model(const CenterlineTree& tree, const SeedOptions& options,
                          const Progress& progress) {
-  const Result<SmoothedTree> smoothed = smooth_for_seed(tree, options, progress);
+  Result<SmoothedTree> smoothed = smooth_for_seed(tree, options, progress);
   if (!smoothed) return fail(smoothed.error());
-  return seed_smoothed(*smoothed, options, progress);
+  Result<Seeded> seeded = seed_with_room(*std::move(smoothed), options, progress);
+  if (!seeded) return fail(seeded.error());
+  return std::move(seeded->model);
 }
 
 Result<SmoothedTree> smooth_for_seed(const CenterlineTree& tree, const SeedOptions& options,
                                      const Progress& progress) {
   Result<SmoothedTree> smoothed = smooth_centerlines(tree, options.smoothing, progress);
-  if (!smoothed || !options.clearance) return smoothed;
-  KeepApartOptions apart;
-  apart.clearance = *options.clearance;
-  return keep_apart(*std::move(smoothed), apart);
+  if (!smoothed) return smoothed;
+  if (options.clearance) {
+    KeepApartOptions apart;
+    apart.clearance = *options.clearance;
+    smoothed = keep_apart(*std::move(smoothed), apart);
+  }
+  return smoothed;
 }
 
-Result<Model> seed_smoothed(const SmoothedTree& tree, const SeedOptions& options,
-                            const Progress& progress) {
-  if (tree.paths.empty()) {
-    return fail({ErrorKind::kBadInput, "the tree has no branches", tree.tree.source, {}, {}});
-  }
-  progress.at("plan", 0.0);
-  Seeder seeder(tree, options, progress);
-  seeder.find_flow();
-  Result<Model> model = seeder.run();
+namespace {
+
+Result<Model> checked(Result<Model> model) {
   if (!model) return model;
   if (auto error = find_defect(model->network)) return fail(*error);
   return model;
+}
+
+std::optional<Error> without_branches(const SmoothedTree& tree) {
+  if (!tree.paths.empty()) return std::nullopt;
+  return Error{ErrorKind::kBadInput, "the tree has no branches", tree.tree.source, {}, {}};
+}
+
+}  // namespace
+
+Result<Model> seed_smoothed(const SmoothedTree& tree, const SeedOptions& options,
+                            const Progress& progress) {
+  if (const auto error = without_branches(tree)) return fail(*error);
+  progress.at("plan", 0.0);
+  Seeder seeder(tree, options, progress);
+  return checked(seeder.run());
+}
+
+Result<Seeded> seed_with_room(SmoothedTree tree, const SeedOptions& options,
+                              const Progress& progress) {
+  if (const auto error = without_branches(tree)) return fail(*error);
+  RoomMaker room(tree);
+  BuiltByName known;
+  int builds = 0;
+  for (int round = 0;; ++round) {
+    if (progress.should_stop()) return fail(cancelled("plan"));
+    progress.at("plan", 0.0);
+    Seeder seeder(tree, options, progress);
+    const bool may_cut = round < kRoomRounds && builds < kRoomBuilds;
+    const auto cut = [&](const std::vector<PlannedNode>& nodes) {
+      bool any = false;
+      for (const PlannedNode& node : nodes) any = room.cut(node) || any;
+      if (any) tree = room.tree();
+      return any;
+    };
+    if (may_cut && cut(seeder.crowded())) continue;
+    ++builds;
+    seeder.reuse(std::move(known));
+    Result<Model> model = checked(seeder.run());
+    if (!model) return fail(model.error());
+    if (may_cut && cut(seeder.failed())) {
+      known = seeder.built();
+      continue;
+    }
+    return Seeded{*std::move(model), std::move(tree)};
+  }
 }
 
 }  // namespace angiospline

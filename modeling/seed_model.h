@@ -39,7 +39,19 @@ Result<Model> seed_model(const CenterlineTree& tree, const SeedOptions& options 
 Result<SmoothedTree> smooth_for_seed(const CenterlineTree& tree, const SeedOptions& options = {},
                                      const Progress& progress = {});
 
-// The second half: from a tree that is smooth already.
+// A model and the smoothed tree it is true to: the one it was made of, thinned where there was no
+// room (modeling/make_room.h).
+struct Seeded {
+  Model model;
+  SmoothedTree tree;
+};
+
+// The second half: from a tree that is smooth already. Junctions that swallow each other or that
+// cannot be built for being several in one are cut, and vessels thinned there; warnings name them.
+Result<Seeded> seed_with_room(SmoothedTree tree, const SeedOptions& options = {},
+                              const Progress& progress = {});
+
+// The same with every vessel as thick as it is.
 Result<Model> seed_smoothed(const SmoothedTree& tree, const SeedOptions& options = {},
                             const Progress& progress = {});
 

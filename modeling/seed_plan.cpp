@@ -210,7 +210,7 @@ void SeedPlan::drop(int b, const std::string& why) {
   join_through(to);
 }
 
-void SeedPlan::merge(int b, const std::string& why) {
+void SeedPlan::merge(int b, double fits, const std::string& why) {
   PlannedBranch& branch = branches_[index(b)];
   const int kept = branch.from;
   const int gone = branch.to;
@@ -241,6 +241,8 @@ void SeedPlan::merge(int b, const std::string& why) {
   a.inlet = a.inlet || c.inlet;
   a.alive = true;
   a.merged = true;
+  a.absorbed.push_back({b, fits});
+  a.absorbed.insert(a.absorbed.end(), c.absorbed.begin(), c.absorbed.end());
   for (const BranchEnd& end : c.ends) {
     PlannedBranch& moved = branches_[index(end.branch)];
     (end.at_end ? moved.to : moved.from) = kept;
@@ -459,7 +461,8 @@ void SeedPlan::make_room(int b, const Room& room) {
   if (from && to && branch.from == branch.to) {
     drop(b, "a loop that lies inside its junction");
   } else if (from && to) {
-    merge(b, fmt::format("is {:.3g} mm long and the two need {:.3g}", room.length, room.least));
+    merge(b, room.length / room.least,
+          fmt::format("is {:.3g} mm long and the two need {:.3g}", room.length, room.least));
   } else {
     const int node = from ? branch.from : branch.to;
     const double missing = room.least - room.length + kLeastBody * room.radius;
@@ -607,7 +610,7 @@ bool SeedPlan::merge_along(int b) {
   if (!nodes_[index(branch.from)].is_junction() || !nodes_[index(branch.to)].is_junction()) {
     return false;
   }
-  merge(b, "has a wall that folds between them");
+  merge(b, 0.0, "has a wall that folds between them");
   return true;
 }
 
@@ -637,7 +640,7 @@ bool SeedPlan::merge_with_nearest(int n, double radii) {
     }
   }
   if (best < 0) return false;
-  merge(best, "lies between junctions that could not be built apart");
+  merge(best, 0.0, "lies between junctions that could not be built apart");
   return true;
 }
 

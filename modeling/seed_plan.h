@@ -39,6 +39,13 @@ struct PlannedBranch {
                                           double distance_mm) const;
 };
 
+// A branch that became part of a junction, and the share of the length it needed that it had; 0 if
+// it was not for its length.
+struct AbsorbedBranch {
+  int branch = -1;
+  double fits = 0.0;
+};
+
 // Free end (one branch end), ring (two ends of one branch) or junction (three or more).
 struct PlannedNode {
   std::string name;  // of merged nodes: "a+b"
@@ -46,7 +53,8 @@ struct PlannedNode {
   std::vector<BranchEnd> ends;
   bool alive = true;
   bool inlet = false;
-  bool merged = false;  // of two junctions or more
+  bool merged = false;                   // of two junctions or more
+  std::vector<AbsorbedBranch> absorbed;  // that lay between these
 
   // Of a junction, once it is measured; in the order of `ends`.
   JunctionSpec spec;
@@ -93,21 +101,28 @@ class SeedPlan {
   bool merge_along(int branch);
   void settle();
 
-  // Where openings still strain the bodies behind them, branches are let bend inside their
-  // junctions: their rays begin on their paths. Returns these nodes; those excluded (one entry a
-  // node) stay as they are.
-  std::vector<int> bend(const std::vector<char>& excluded);
+  // Where openings still strain the bodies behind them, branches may bend inside their junctions:
+  // their rays begin on their paths. find_bends() looks for ways to do so, at most kAlternatives a
+  // node, the best first. bend() takes of each node the first that is not refused and leaves every
+  // branch its room; `refused` (one entry a node): so many of its ways are not to be taken. It
+  // returns the nodes that have changed, and is asked once only: again of a copy made before.
+  static constexpr int kAlternatives = 4;
+  void find_bends();
+  std::vector<int> bend(const std::vector<int>& refused);
 
  private:
   struct Room;
   // In seed_plan_bend.cpp.
   struct Eased;
-  void ease(Eased& best) const;
-  std::optional<PlannedNode> eased(const PlannedNode& node) const;
+  double cost_at(const PlannedNode& node, std::size_t slot) const;
+  std::vector<double> costs_of(const PlannedNode& node) const;
+  void ease(Eased best, std::vector<Eased>& found) const;
+  std::vector<PlannedNode> eased(const PlannedNode& node) const;
   // In seed_plan_measure.cpp.
   void measure(PlannedNode& node) const;
   void aim(PlannedNode& node, const std::vector<double>& distance_mm) const;
   bool find_distances(PlannedNode& node, std::vector<double>& distance_mm) const;
+  double bend_behind(const PlannedNode& node, std::size_t slot, double along) const;
   double strain_at(const PlannedNode& node, std::size_t slot) const;
   double overlap_behind(const PlannedNode& node, std::size_t i, std::size_t j) const;
   double strain_of(const PlannedNode& node) const;
@@ -124,7 +139,7 @@ class SeedPlan {
   bool drop_inner_loop(int node);
   void extend(int branch, double missing_mm);
   void drop(int branch, const std::string& why);
-  void merge(int branch, const std::string& why);
+  void merge(int branch, double fits, const std::string& why);
   bool straighten(int branch, const Room& room, double bend);
   void make_room(int branch, const Room& room);
   void join_through(int node);
@@ -136,7 +151,8 @@ class SeedPlan {
   JunctionOptions options_;
   std::vector<PlannedNode> nodes_;
   std::vector<PlannedBranch> branches_;
-  std::vector<char> dirty_;  // nodes to measure again
+  std::vector<std::vector<PlannedNode>> bends_;  // other ways to plan each node
+  std::vector<char> dirty_;                      // nodes to measure again
   std::vector<std::string> warnings_;
 };
 

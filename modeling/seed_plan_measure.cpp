@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "modeling/body_path.h"
 #include "modeling/seed_plan.h"
 
 namespace angiospline {
@@ -26,6 +27,9 @@ constexpr double kSettled = 0.02;    // radii
 constexpr double kOnItsPath = 0.25;  // radii between an opening and its branch that are no strain
 constexpr double kAllowedSag = 0.4;  // radii between a branch and the chord it is taken for
 constexpr double kSagStrain = 0.5;   // of a radius more, in radians
+constexpr double kBendStep = 0.25;   // radii between places at which bends are measured,
+constexpr double kBendReach = 4.0;   // and how far behind the opening
+constexpr double kBendStrain = 1.0;  // of curvature times radius beyond kTightestBend
 constexpr double kOverlapStrain = 0.6;  // of two branches that still overlap behind their openings
 constexpr double kLookedAhead = 8.0;    // radii behind the openings
 constexpr double kUnmeasured = 10.0;    // strain where no openings can be found
@@ -167,7 +171,33 @@ void SeedPlan::measure(PlannedNode& node) const {
 
 // ---------------------------------------------------------------- what openings ask of bodies
 
-// The angle by which the path turns away from its opening, and what the chord leaves of it.
+// Curvature times radius of the body behind an opening, the largest: that of the path itself and of
+// the beam that makes up for what the opening misses of it (modeling/body_path.cpp). With x = s / 2
+// r the beam that dies out is exp(-x) (a cos x + b sin x).
+double SeedPlan::bend_behind(const PlannedNode& node, std::size_t slot, double along) const {
+  const BranchEnd end = node.ends[slot];
+  const PlannedBranch& branch = branches_[index(end.branch)];
+  const JunctionBranch& opening = node.spec.branches[slot];
+  const double r = opening.radius_mm;
+  const auto at = [&](double s) { return branch.at(end.at_end ? branch.length_mm() - s : s); };
+  const double step = kBendStep * r;
+  const auto tangent = [&](double s) { return Vec3((at(s + step) - at(s)).head<3>() / step); };
+  const double distance = std::max(node.wanted_mm[slot], node.meets_mm[slot]);
+  const Vec3 a = node.center_mm + place_on_branch_mm(opening, distance) - at(along).head<3>();
+  const Vec3 b = a + 2 * r * (opening.direction - tangent(along));
+  double largest = 0;
+  for (double s = 0; s <= kBendReach * r; s += step) {
+    if (along + s + 2 * step > branch.length_mm()) break;
+    const Vec3 own = (tangent(along + s + step) - tangent(along + s)) / step;
+    const double x = s / (2 * r);
+    const Vec3 added = std::exp(-x) * (std::sin(x) * a - std::cos(x) * b) / (2 * r * r);
+    largest = std::max(largest, (own + added).norm() * at(along + s + step)(3));
+  }
+  return largest;
+}
+
+// The angle by which the path turns away from its opening, by how much a body behind it bends too
+// tightly, and what the chord leaves of the branch.
 double SeedPlan::strain_at(const PlannedNode& node, std::size_t slot) const {
   const BranchEnd end = node.ends[slot];
   const PlannedBranch& branch = branches_[index(end.branch)];
@@ -185,15 +215,24 @@ double SeedPlan::strain_at(const PlannedNode& node, std::size_t slot) const {
   if (way.norm() > 0.1 * r) {
     strain = std::acos(std::clamp(way.normalized().dot(opening.direction), -1.0, 1.0));
   }
+  strain += kBendStrain * std::max(0.0, bend_behind(node, slot, *along) - kTightestBend);
   const double off =
       (at(*along) - node.center_mm - place_on_branch_mm(opening, distance)).norm() / r;
   if (off > kOnItsPath) strain += off;
+  // From the ray, and before it begins from the core that leads there.
   double sag = 0;
   const int steps = 1 + static_cast<int>(4 * *along / r);
+  const double core = opening.offset_mm.norm();
   for (int i = 1; i < steps; ++i) {
-    const Vec3 arm = at(*along * i / steps) - node.center_mm - opening.offset_mm;
-    if (arm.norm() < r) continue;
-    sag = std::max(sag, (arm - arm.dot(opening.direction) * opening.direction).norm() / r);
+    const Vec3 arm = at(*along * i / steps) - node.center_mm;
+    const Vec3 beyond = arm - opening.offset_mm;
+    if (beyond.norm() < r) continue;
+    double away = (beyond - beyond.dot(opening.direction) * opening.direction).norm();
+    if (core > 0) {
+      const double share = std::clamp(arm.dot(opening.offset_mm) / (core * core), 0.0, 1.0);
+      away = std::min(away, (arm - share * opening.offset_mm).norm());
+    }
+    sag = std::max(sag, away / r);
   }
   return strain + kSagStrain * std::max(0.0, sag - kAllowedSag);
 }

@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "modeling/fidelity.h"
+#include "modeling/make_room.h"
 #include "modeling/seed_model.h"
 #include "modeling/seed_plan.h"
 #include "modeling/smooth_centerlines.h"
@@ -201,13 +203,14 @@ double turn_behind(const SeedPlan& plan, int node, std::size_t slot) {
 TEST(SeedPlan, LetsABranchBendInsideItsJunctionWhereItWouldTurnBehindItsOpening) {
   const SmoothedTree smooth = smooth_centerlines(hooked_fork().tree).value();
   SeedPlan plan(smooth, {});
+  plan.find_bends();
   const auto worst = [&] {
     double largest = 0;
     for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, turn_behind(plan, 1, k));
     return largest;
   };
   const double before = worst();
-  EXPECT_TRUE(SeedPlan(plan).bend({0, 1, 0, 0}).empty());  // excluded
+  EXPECT_TRUE(SeedPlan(plan).bend({0, SeedPlan::kAlternatives, 0, 0}).empty());
   ASSERT_EQ(plan.bend({0, 0, 0, 0}), std::vector<int>{1});
   EXPECT_LT(worst(), before - 0.2);
 
@@ -335,6 +338,86 @@ TEST(SeedModel, ManyJunctionsTooNearEachOtherBecomeOneOfSixBranches) {
   EXPECT_EQ(model->network.rims.size(), 6u);
   EXPECT_EQ(model->network.regions.size(), 7u);
   expect_smooth(model->network);
+}
+
+// Forks every radius and a half along a thick trunk: each leaves the next too little length.
+TreeMaker crowded_trunk(int forks) {
+  TreeMaker maker;
+  int before = maker.node({0, 0, -16}, "root");
+  maker.tree.inlets = {before};
+  for (int k = 0; k < forks; ++k) {
+    const Vec3 place(0, 0, 2.25 * k);
+    const double angle = 2.4 * k;
+    const int fork = maker.node(place, "fork" + std::to_string(k));
+    maker.line(before, fork, 1.5);
+    const Vec3 side(11 * std::cos(angle), 11 * std::sin(angle), 5);
+    maker.line(fork, maker.node(place + side, "side" + std::to_string(k)), 1.0);
+    before = fork;
+  }
+  maker.line(before, maker.node({0, 0, 2.25 * forks + 16}, "tip"), 1.5);
+  return maker;
+}
+
+TEST(RoomMaker, CutsAJunctionWhereTheLeastIsLackingAndThinsVesselsThere) {
+  const SmoothedTree tree = smooth_centerlines(crowded_trunk(10).tree).value();
+  const SeedPlan plan(tree, {});
+  const auto largest = [](const SeedPlan& p) {
+    return *std::max_element(
+        p.nodes().begin(), p.nodes().end(),
+        [](const PlannedNode& a, const PlannedNode& b) { return a.ends.size() < b.ends.size(); });
+  };
+  const PlannedNode before = largest(plan);
+  ASSERT_GT(before.ends.size(), 6U);
+
+  RoomMaker room(tree);
+  EXPECT_EQ(room.tree().warnings, tree.warnings);
+  for (int round = 0; round < 12; ++round) {
+    const PlannedNode now = largest(SeedPlan(room.tree(), {}));
+    if (now.ends.size() <= 6) break;
+    ASSERT_TRUE(room.cut(now));
+  }
+  const SmoothedTree made = room.tree();
+  EXPECT_LE(largest(SeedPlan(made, {})).ends.size(), 6U);
+  int thinned = 0;
+  for (std::size_t b = 0; b < tree.paths.size(); ++b) {
+    const double length = tree.paths[b].knots().last();
+    bool any = false;
+    for (int k = 0; k <= 50; ++k) {
+      const Vec4 was = tree.paths[b].at(length * k / 50);
+      const Vec4 is = made.paths[b].at(length * k / 50);
+      EXPECT_LT((was - is).head<3>().norm(), 1e-9);
+      EXPECT_GT(is(3), 0.39 * was(3));
+      EXPECT_LT(is(3), (1 + 1e-9) * was(3));
+      any = any || is(3) < 0.99 * was(3);
+      // The ends of the tree are far from what is lacking.
+      if (tree.tree.branches[b].name == "root_fork0" && length * k / 50 < 6) {
+        EXPECT_NEAR(is(3), was(3), 1e-5);
+      }
+    }
+    if (!any) continue;
+    ++thinned;
+    const std::string start = "branch " + tree.tree.branches[b].name + " was thinned";
+    EXPECT_TRUE(std::any_of(made.warnings.begin(), made.warnings.end(), [&](const auto& text) {
+      return text.rfind(start, 0) == 0;
+    })) << start;
+  }
+  EXPECT_GT(thinned, 0);
+}
+
+TEST(SeedModel, ACrowdedTrunkIsOneNetworkAndSaysWhatWasThinned) {
+  const Result<Seeded> seeded = seed_with_room(smooth_centerlines(crowded_trunk(10).tree).value());
+  ASSERT_TRUE(seeded) << seeded.error().message();
+  EXPECT_TRUE(seeded->model.failed.empty());
+  EXPECT_EQ(seeded->model.network.rims.size(), 12U);
+  expect_smooth(seeded->model.network);
+  const auto& warnings = seeded->model.warnings;
+  EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(), [](const std::string& text) {
+    return text.find("was thinned to") != std::string::npos;
+  }));
+  // The walls follow the tree as it was thinned.
+  const Fidelity f = measure_fidelity(seeded->model.network, seeded->tree);
+  EXPECT_GT(f.sections, 50);
+  EXPECT_LT(f.largest_radius_error, 0.05);
 }
 
 // A trunk with two forks; `spoil` makes the second one impossible.

@@ -141,8 +141,9 @@ TEST_P(SeedFamilies, AreClosedValidSmoothSolidsTrueToTheirTree) {
   const CenterlineTree tree = kind.make(random);
   const auto smoothed = smooth_centerlines(tree);
   ASSERT_TRUE(smoothed) << smoothed.error().message();
-  const auto model = seed_smoothed(*smoothed);
-  ASSERT_TRUE(model) << model.error().message();
+  const auto seeded = seed_with_room(*smoothed);
+  ASSERT_TRUE(seeded) << seeded.error().message();
+  const Model* const model = &seeded->model;
   for (const FailedPart& part : model->failed) ADD_FAILURE() << part.name << ": " << part.why;
   const Certificate c = certificate_of(*model);
   EXPECT_TRUE(c.closed && c.valid);
@@ -151,7 +152,7 @@ TEST_P(SeedFamilies, AreClosedValidSmoothSolidsTrueToTheirTree) {
   EXPECT_LT(c.max_normal_angle_deg, 0.01);
   EXPECT_GT(c.min_jacobian_ratio, 0.01);
   EXPECT_TRUE(kind.may_touch || !c.self_intersecting);
-  const Fidelity f = measure_fidelity(model->network, *smoothed);
+  const Fidelity f = measure_fidelity(model->network, seeded->tree);
   EXPECT_LT(f.mean_radius_error, 0.01);
   EXPECT_LT(f.largest_radius_error, 0.05) << f.largest_error_branch;
 }
