@@ -5,6 +5,7 @@
 #include <locale>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
@@ -94,10 +95,10 @@ std::optional<std::string> find_missing_table(const std::string& text) {
 
 }  // namespace
 
-Result<void> write_brep(const Solid& solid, const std::filesystem::path& path,
-                        const Progress& progress) {
+Result<void> write_brep(Solid solid, const std::filesystem::path& path, const Progress& progress) {
+  const SolidDigest digest = digest_of(solid);
   return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(solid, temporary, progress); !done) {
+    if (auto done = write_unchecked(std::exchange(solid, {}), temporary, progress); !done) {
       if (done.error().kind == ErrorKind::kCancelled) return done;
       return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
     }
@@ -106,7 +107,7 @@ Result<void> write_brep(const Solid& solid, const std::filesystem::path& path,
       if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
       return cannot_write(path, "cannot be read back: " + read.error().what);
     }
-    return expect_same(solid, *read, path);
+    return expect_same(digest, *read, path);
   });
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <string_view>
 #include <unordered_map>
 
 #include <BRepBndLib.hxx>
@@ -31,6 +32,7 @@
 #include <XCAFDoc_ColorTool.hxx>
 #include <XCAFDoc_DocumentTool.hxx>
 #include <XCAFDoc_ShapeTool.hxx>
+#include <XSAlgo.hxx>
 
 #include "modeling/solid_shape.h"
 
@@ -90,31 +92,51 @@ int count(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
   return n;
 }
 
-// Largest distance between two surfaces at the same fractions of their domains; nothing for a
-// plane, whose domain is endless.
-std::optional<double> surface_distance(const Geom_Surface& a, const Geom_Surface& b) {
-  const auto domain = [](const Geom_Surface& s) {
-    std::array<double, 4> d{};
-    s.Bounds(d[0], d[1], d[2], d[3]);
-    return d;
-  };
-  const std::array<double, 4> da = domain(a);
-  const std::array<double, 4> db = domain(b);
-  if (Precision::IsInfinite(da[0]) || Precision::IsInfinite(db[0])) return std::nullopt;
-  constexpr int kSteps = 6;
-  double largest = 0;
+// Even steps of a surface's domain at which it is compared.
+constexpr int kSteps = 6;
+static_assert((kSteps + 1) * (kSteps + 1) == kDigestSamples);
+
+// The surface at even fractions of its domain; nothing for a plane, whose domain is endless.
+std::vector<Vec3> samples_of(const Geom_Surface& surface) {
+  double u0 = 0, u1 = 0, v0 = 0, v1 = 0;
+  surface.Bounds(u0, u1, v0, v1);
+  if (Precision::IsInfinite(u0)) return {};
+  std::vector<Vec3> samples;
+  samples.reserve(kDigestSamples);
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
-      const auto at = [&](const Geom_Surface& s, const std::array<double, 4>& d) {
-        return s.Value(d[0] + (d[1] - d[0]) * i / kSteps, d[2] + (d[3] - d[2]) * j / kSteps);
-      };
-      const double distance = at(a, da).Distance(at(b, db));
-      if (!std::isfinite(distance)) return std::numeric_limits<double>::infinity();
-      largest = std::max(largest, distance);
+      const gp_Pnt p = surface.Value(u0 + (u1 - u0) * i / kSteps, v0 + (v1 - v0) * j / kSteps);
+      samples.emplace_back(p.X(), p.Y(), p.Z());
     }
+  }
+  return samples;
+}
+
+// Largest distance of two samplings; nothing if one of them is a plane's.
+std::optional<double> surface_distance(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  if (a.empty() || b.empty()) return std::nullopt;
+  double largest = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const double distance = (a[k] - b[k]).norm();
+    if (!std::isfinite(distance)) return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, distance);
   }
   return largest;
 }
+
+// Leaves shapes that are read as they are.
+class UnhealedShapes : public XSAlgo_AlgoContainer {
+ public:
+  TopoDS_Shape ProcessShape(const TopoDS_Shape& shape, double precision, double max_tolerance,
+                            Standard_CString resource, Standard_CString sequence,
+                            Handle(Standard_Transient) & info,
+                            const Message_ProgressRange& progress,
+                            Standard_Boolean non_manifold) const override {
+    if (std::string_view(sequence).starts_with("read.")) return shape;
+    return XSAlgo_AlgoContainer::ProcessShape(shape, precision, max_tolerance, resource, sequence,
+                                              info, progress, non_manifold);
+  }
+};
 
 tl::unexpected<Error> differs(const std::filesystem::path& path, std::string what,
                               std::string value, std::string rule) {
@@ -231,45 +253,69 @@ void mark_caps(const TopoDS_Shape& shape, std::vector<SolidFace>& faces) {
   }
 }
 
-Result<void> expect_same(const Solid& written, const Solid& read,
+SolidDigest digest_of(const Solid& solid) {
+  const TopoDS_Shape& shape = solid.shape->shape;
+  SolidDigest digest;
+  digest.solids = count(shape, TopAbs_SOLID);
+  digest.shells = count(shape, TopAbs_SHELL);
+  Bnd_Box box;
+  BRepBndLib::AddClose(shape, box);
+  digest.size_mm = std::sqrt(box.SquareExtent());
+  digest.faces.reserve(solid.faces.size());
+  for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {
+    digest.faces.push_back({solid.faces[digest.faces.size()].name,
+                            at.Current().Orientation() == TopAbs_REVERSED,
+                            samples_of(*BRep_Tool::Surface(TopoDS::Face(at.Current())))});
+  }
+  return digest;
+}
+
+Result<void> expect_same(const SolidDigest& written, const Solid& read,
                          const std::filesystem::path& path) {
-  const TopoDS_Shape& a = written.shape->shape;
-  const TopoDS_Shape& b = read.shape->shape;
+  const TopoDS_Shape& shape = read.shape->shape;
   const std::string rule = "the file must hold what was written";
-  for (const auto& [kind, name] : {std::pair{TopAbs_SOLID, "solids"}, {TopAbs_SHELL, "shells"}}) {
-    if (count(a, kind) == count(b, kind)) continue;
-    return differs(path, std::string("other number of ") + name + " read back",
-                   std::to_string(count(b, kind)), rule);
+  const auto other_number = [&](const char* of, int number) {
+    return differs(path, std::string("other number of ") + of + " read back",
+                   std::to_string(number), rule);
+  };
+  if (const int solids = count(shape, TopAbs_SOLID); solids != written.solids) {
+    return other_number("solids", solids);
+  }
+  if (const int shells = count(shape, TopAbs_SHELL); shells != written.shells) {
+    return other_number("shells", shells);
   }
   if (written.faces.size() != read.faces.size()) {
-    return differs(path, "other number of faces read back", std::to_string(read.faces.size()),
-                   rule);
+    return other_number("faces", static_cast<int>(read.faces.size()));
   }
-  Bnd_Box box;
-  BRepBndLib::AddClose(a, box);
-  const double size = std::sqrt(box.SquareExtent());
-  TopExp_Explorer at_a(a, TopAbs_FACE), at_b(b, TopAbs_FACE);
-  for (std::size_t k = 0; k < written.faces.size(); ++k, at_a.Next(), at_b.Next()) {
-    if (written.faces[k].name != read.faces[k].name) {
-      return differs(path, "face name did not survive: " + written.faces[k].name,
-                     read.faces[k].name, rule);
+  TopExp_Explorer at(shape, TopAbs_FACE);
+  for (std::size_t k = 0; k < written.faces.size(); ++k, at.Next()) {
+    const SolidDigest::Face& face = written.faces[k];
+    if (face.name != read.faces[k].name) {
+      return differs(path, "face name did not survive: " + face.name, read.faces[k].name, rule);
     }
-    if (at_a.Current().Orientation() != at_b.Current().Orientation()) {
-      return differs(path, "face is inside out", written.faces[k].name, rule);
+    if (face.reversed != (at.Current().Orientation() == TopAbs_REVERSED)) {
+      return differs(path, "face is inside out", face.name, rule);
     }
-    const auto distance = surface_distance(*BRep_Tool::Surface(TopoDS::Face(at_a.Current())),
-                                           *BRep_Tool::Surface(TopoDS::Face(at_b.Current())));
-    if (distance && !(*distance <= 1e-9 * size)) {
-      return differs(path, "surface moved: " + written.faces[k].name,
-                     std::to_string(*distance) + " mm", rule);
+    const auto distance = surface_distance(
+        face.samples_mm, samples_of(*BRep_Tool::Surface(TopoDS::Face(at.Current()))));
+    if (distance && !(*distance <= 1e-9 * written.size_mm)) {
+      return differs(path, "surface moved: " + face.name, std::to_string(*distance) + " mm", rule);
     }
   }
-  for (TopExp_Explorer at(b, TopAbs_SHELL); at.More(); at.Next()) {
-    if (BRep_Tool::IsClosed(at.Current())) continue;
+  for (TopExp_Explorer shell(shape, TopAbs_SHELL); shell.More(); shell.Next()) {
+    if (BRep_Tool::IsClosed(shell.Current())) continue;
     return differs(path, "shell is open after reading back", {}, rule);
   }
   return {};
 }
+
+WithoutHealing::WithoutHealing() : kept_(XSAlgo::AlgoContainer()) {
+  const Handle(XSAlgo_AlgoContainer) unhealed = new UnhealedShapes;
+  unhealed->SetToolContainer(kept_->ToolContainer());
+  XSAlgo::SetAlgoContainer(unhealed);
+}
+
+WithoutHealing::~WithoutHealing() { XSAlgo::SetAlgoContainer(kept_); }
 
 Result<void> expect_readable(const std::filesystem::path& path) {
   std::error_code ec;

@@ -1,5 +1,8 @@
 #include "io/iges_file.h"
 
+#include <optional>
+#include <utility>
+
 #include <IGESBasic_Name.hxx>
 #include <IGESCAFControl_Reader.hxx>
 #include <IGESCAFControl_Writer.hxx>
@@ -97,25 +100,8 @@ Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& pa
   }
 }
 
-}  // namespace
-
-Result<void> write_iges(const Solid& solid, const std::filesystem::path& path,
-                        const IgesOptions& options, const Progress& progress) {
-  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(solid, temporary, options, progress); !done) {
-      if (done.error().kind == ErrorKind::kCancelled) return done;
-      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
-    }
-    const Result<Solid> read = read_iges(temporary, progress);
-    if (!read) {
-      if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
-      return cannot_write(path, "cannot be read back: " + read.error().what);
-    }
-    return expect_same(solid, *read, path);
-  });
-}
-
-Result<Solid> read_iges(const std::filesystem::path& path, const Progress& progress) {
+Result<Solid> read_iges(const std::filesystem::path& path, Healing healing,
+                        const Progress& progress) {
   if (auto readable = expect_readable(path); !readable) return fail(readable.error());
   const auto bad = [&](std::string what) {
     return fail({ErrorKind::kBadInput, std::move(what), path.string(), {}, {}});
@@ -125,6 +111,8 @@ Result<Solid> read_iges(const std::filesystem::path& path, const Progress& progr
     IGESControl_Controller::Init();
     Interface_Static::SetCVal("xstep.cascade.unit", "MM");
     IGESCAFControl_Reader reader;
+    std::optional<WithoutHealing> unhealed;
+    if (healing == Healing::kNone) unhealed.emplace();
     reader.SetNameMode(true);
     reader.SetColorMode(true);
     if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) return bad("is not an IGES file");
@@ -139,6 +127,30 @@ Result<Solid> read_iges(const std::filesystem::path& path, const Progress& progr
   } catch (const Standard_Failure& failure) {
     return bad(std::string("OpenCASCADE failed: ") + failure.GetMessageString());
   }
+}
+
+}  // namespace
+
+Result<void> write_iges(Solid solid, const std::filesystem::path& path, const IgesOptions& options,
+                        const Progress& progress) {
+  const SolidDigest digest = digest_of(solid);
+  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
+    if (auto done = write_unchecked(std::exchange(solid, {}), temporary, options, progress);
+        !done) {
+      if (done.error().kind == ErrorKind::kCancelled) return done;
+      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
+    }
+    const Result<Solid> read = read_iges(temporary, Healing::kNone, progress);
+    if (!read) {
+      if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
+      return cannot_write(path, "cannot be read back: " + read.error().what);
+    }
+    return expect_same(digest, *read, path);
+  });
+}
+
+Result<Solid> read_iges(const std::filesystem::path& path, const Progress& progress) {
+  return read_iges(path, Healing::kAsReadersDo, progress);
 }
 
 }  // namespace angiospline

@@ -16,8 +16,9 @@ struct IgesOptions {
 
 // Writes the solid in millimetres as manifold solids (entity 186), reads the file back, and only
 // when the same faces, names, kinds and closed solids came out of it moves it to `path`. The same
-// solid gives the same bytes. Errors: kCannotWrite; stopped on request.
-Result<void> write_iges(const Solid& solid, const std::filesystem::path& path,
+// solid gives the same bytes. A solid that is moved in is let go before that. Errors: kCannotWrite;
+// stopped on request.
+Result<void> write_iges(Solid solid, const std::filesystem::path& path,
                         const IgesOptions& options = {}, const Progress& progress = {});
 
 // Any IGES file, by any program, in millimetres whatever its unit; loose faces stay loose. Faces

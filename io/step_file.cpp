@@ -1,12 +1,27 @@
 #include "io/step_file.h"
 
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
 #include <APIHeaderSection_MakeHeader.hxx>
+#include <Interface_EntityIterator.hxx>
 #include <Interface_Static.hxx>
 #include <STEPCAFControl_Controller.hxx>
 #include <STEPCAFControl_Reader.hxx>
 #include <STEPCAFControl_Writer.hxx>
 #include <Standard_Failure.hxx>
+#include <StepData_Protocol.hxx>
 #include <StepData_StepModel.hxx>
+#include <StepData_StepWriter.hxx>
+#include <StepGeom_BSplineCurve.hxx>
+#include <StepGeom_BSplineSurface.hxx>
+#include <StepGeom_CartesianPoint.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <XSControl_WorkSession.hxx>
 
@@ -49,24 +64,104 @@ tl::unexpected<Error> cannot_write(const std::filesystem::path& path, std::strin
   return fail({ErrorKind::kCannotWrite, std::move(what), path.string(), {}, {}});
 }
 
-Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& path,
+// Points by the bits of their coordinates, so that each is written once.
+class PointPool {
+ public:
+  // The first point with the same coordinates and name.
+  Handle(StepGeom_CartesianPoint) shared(const Handle(StepGeom_CartesianPoint) & point) {
+    std::array<std::uint64_t, 4> key{static_cast<std::uint64_t>(point->NbCoordinates())};
+    for (int k = 1; k <= point->NbCoordinates(); ++k) {
+      key[static_cast<std::size_t>(k)] = std::bit_cast<std::uint64_t>(point->CoordinatesValue(k));
+    }
+    return points_.try_emplace(key, point).first->second;
+  }
+
+ private:
+  struct Hash {
+    std::size_t operator()(const std::array<std::uint64_t, 4>& key) const {
+      std::uint64_t h = 0;
+      for (const std::uint64_t k : key) h = (h ^ k ^ (h >> 29)) * 0x9e3779b97f4a7c15ULL;
+      return h ^ (h >> 32);
+    }
+  };
+  std::unordered_map<std::array<std::uint64_t, 4>, Handle(StepGeom_CartesianPoint), Hash> points_;
+};
+
+// The same model with every control point of curves and surfaces written once: neighbours share
+// their sides', edges those of the surfaces beside them. It holds on to nothing but its entities.
+Handle(StepData_StepModel) with_shared_points(const Handle(StepData_StepModel) & model) {
+  PointPool pool;
+  std::unordered_set<const Standard_Transient*> replaced;
+  const auto share = [&](Handle(StepGeom_CartesianPoint) & point) {
+    const Handle(StepGeom_CartesianPoint) kept = pool.shared(point);
+    if (kept == point) return;
+    replaced.insert(point.get());
+    point = kept;
+  };
+  for (int i = 1; i <= model->NbEntities(); ++i) {
+    const Handle(Standard_Transient)& entity = model->Value(i);
+    if (const auto curve = Handle(StepGeom_BSplineCurve)::DownCast(entity); !curve.IsNull()) {
+      for (Handle(StepGeom_CartesianPoint) & p : *curve->ControlPointsList()) share(p);
+    } else if (const auto surface = Handle(StepGeom_BSplineSurface)::DownCast(entity);
+               !surface.IsNull()) {
+      const Handle(StepGeom_HArray2OfCartesianPoint) points = surface->ControlPointsList();
+      for (int r = points->LowerRow(); r <= points->UpperRow(); ++r) {
+        for (int c = points->LowerCol(); c <= points->UpperCol(); ++c) {
+          share(points->ChangeValue(r, c));
+        }
+      }
+    }
+  }
+  const Handle(StepData_StepModel) result = new StepData_StepModel;
+  result->SetProtocol(model->Protocol());
+  Interface_EntityIterator header = model->Header();
+  for (; header.More(); header.Next()) result->AddHeaderEntity(header.Value());
+  for (int i = 1; i <= model->NbEntities(); ++i) {
+    if (!replaced.contains(model->Value(i).get())) result->AddEntity(model->Value(i));
+  }
+  return result;
+}
+
+// The entities of the solid. OpenCASCADE's document, its maps from shapes to entities and the solid
+// itself are not needed any longer when it returns.
+Result<Handle(StepData_StepModel)> entities_of(const Solid& solid,
+                                               const std::filesystem::path& path,
+                                               const StepOptions& options,
+                                               const Progress& progress) {
+  STEPCAFControl_Controller::Init();
+  set_write_options(
+      options);  // before the writer makes its model, which takes the schema from them
+  STEPCAFControl_Writer writer;
+  writer.SetNameMode(true);
+  writer.SetColorMode(true);
+  // What a vessel does not have costs two passes over the model all the same.
+  writer.SetLayerMode(false);
+  writer.SetPropsMode(false);
+  writer.SetSHUOMode(false);
+  writer.SetDimTolMode(false);
+  writer.SetMaterialMode(false);
+  const Handle(TDocStd_Document) document = document_of(solid, options.product);
+  const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, "write STEP");
+  const bool done = writer.Transfer(document, STEPControl_AsIs, nullptr, indicator->Start());
+  document->Close();
+  if (progress.should_stop()) return fail(cancelled("write STEP"));
+  if (!done) return cannot_write(path, "OpenCASCADE could not convert the solid to STEP");
+  const auto model = Handle(StepData_StepModel)::DownCast(writer.ChangeWriter().WS()->Model());
+  set_header(model, options);
+  return with_shared_points(model);
+}
+
+// Takes the solid, and lets it go before the text is made.
+Result<void> write_unchecked(Solid solid, const std::filesystem::path& path,
                              const StepOptions& options, const Progress& progress) {
   try {
     const auto lock = lock_exchange();
-    STEPCAFControl_Controller::Init();
-    set_write_options(
-        options);  // before the writer makes its model, which takes the schema from them
-    STEPCAFControl_Writer writer;
-    writer.SetNameMode(true);
-    writer.SetColorMode(true);
-    const Handle(TDocStd_Document) document = document_of(solid, options.product);
-    const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, "write STEP");
-    const bool done = writer.Transfer(document, STEPControl_AsIs, nullptr, indicator->Start());
-    document->Close();
-    if (progress.should_stop()) return fail(cancelled("write STEP"));
-    if (!done) return cannot_write(path, "OpenCASCADE could not convert the solid to STEP");
-    set_header(Handle(StepData_StepModel)::DownCast(writer.ChangeWriter().WS()->Model()), options);
-    if (writer.Write(path.c_str()) != IFSelect_RetDone) {
+    const auto model = entities_of(std::exchange(solid, {}), path, options, progress);
+    if (!model) return fail(model.error());
+    StepData_StepWriter text(*model);
+    text.SendModel(Handle(StepData_Protocol)::DownCast((*model)->Protocol()));
+    std::ofstream file(path, std::ios::binary);
+    if (!text.Print(file) || !file.flush()) {
       return cannot_write(path, "OpenCASCADE could not write the file");
     }
     return {};
@@ -75,25 +170,8 @@ Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& pa
   }
 }
 
-}  // namespace
-
-Result<void> write_step(const Solid& solid, const std::filesystem::path& path,
-                        const StepOptions& options, const Progress& progress) {
-  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(solid, temporary, options, progress); !done) {
-      if (done.error().kind == ErrorKind::kCancelled) return done;
-      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
-    }
-    const Result<Solid> read = read_step(temporary, progress);
-    if (!read) {
-      if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
-      return cannot_write(path, "cannot be read back: " + read.error().what);
-    }
-    return expect_same(solid, *read, path);
-  });
-}
-
-Result<Solid> read_step(const std::filesystem::path& path, const Progress& progress) {
+Result<Solid> read_step(const std::filesystem::path& path, Healing healing,
+                        const Progress& progress) {
   if (auto readable = expect_readable(path); !readable) return fail(readable.error());
   const auto bad = [&](std::string what) {
     return fail({ErrorKind::kBadInput, std::move(what), path.string(), {}, {}});
@@ -101,6 +179,8 @@ Result<Solid> read_step(const std::filesystem::path& path, const Progress& progr
   try {
     const auto lock = lock_exchange();
     STEPCAFControl_Reader reader;
+    std::optional<WithoutHealing> unhealed;
+    if (healing == Healing::kNone) unhealed.emplace();
     Interface_Static::SetIVal("read.stepcaf.subshapes.name", 1);
     Interface_Static::SetCVal("xstep.cascade.unit", "MM");
     reader.SetNameMode(true);
@@ -121,6 +201,30 @@ Result<Solid> read_step(const std::filesystem::path& path, const Progress& progr
   } catch (const Standard_Failure& failure) {
     return bad(std::string("OpenCASCADE failed: ") + failure.GetMessageString());
   }
+}
+
+}  // namespace
+
+Result<void> write_step(Solid solid, const std::filesystem::path& path, const StepOptions& options,
+                        const Progress& progress) {
+  const SolidDigest digest = digest_of(solid);
+  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
+    if (auto done = write_unchecked(std::exchange(solid, {}), temporary, options, progress);
+        !done) {
+      if (done.error().kind == ErrorKind::kCancelled) return done;
+      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
+    }
+    const Result<Solid> read = read_step(temporary, Healing::kNone, progress);
+    if (!read) {
+      if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
+      return cannot_write(path, "cannot be read back: " + read.error().what);
+    }
+    return expect_same(digest, *read, path);
+  });
+}
+
+Result<Solid> read_step(const std::filesystem::path& path, const Progress& progress) {
+  return read_step(path, Healing::kAsReadersDo, progress);
 }
 
 }  // namespace angiospline

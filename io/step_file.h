@@ -19,9 +19,9 @@ struct StepOptions {
 
 // Writes the solid in millimetres, reads the file back, and only when the same faces, names, kinds
 // and closed solids came out of it moves it to `path`. The same solid gives the same bytes: the
-// time stamp is fixed. Errors: kCannotWrite, naming what could not be written or what did not
-// survive; stopped on request.
-Result<void> write_step(const Solid& solid, const std::filesystem::path& path,
+// time stamp is fixed. A solid that is moved in is let go as soon as its entities are made. Errors:
+// kCannotWrite, naming what could not be written or what did not survive; stopped on request.
+Result<void> write_step(Solid solid, const std::filesystem::path& path,
                         const StepOptions& options = {}, const Progress& progress = {});
 
 // Any STEP file, by any program, in millimetres whatever its unit. Face names and colours are kept;

@@ -1,6 +1,9 @@
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include <BRepPrimAPI_MakeBox.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
@@ -110,6 +113,31 @@ TEST_F(CadFiles, OfStepStateSchemaProductAndMillimetres) {
   EXPECT_NE(text.find("SI_UNIT(.MILLI.,.METRE.)"), std::string::npos);
   ASSERT_TRUE(write_step(sample(), path, {StepSchema::kAp214, "left carotid"}));
   EXPECT_NE(read_file(path).value().find("AUTOMOTIVE_DESIGN"), std::string::npos);
+}
+
+// Neighbours share the control points of their common side, and edges those of the surfaces.
+TEST_F(CadFiles, OfStepHoldEachControlPointOnce) {
+  const fs::path path = folder_ / "model.step";
+  ASSERT_TRUE(write_step(sample(), path));
+  std::string text = read_file(path).value();
+  std::erase_if(text, [](char c) { return c == '\n' || c == '\r'; });
+  const auto entities = [&](const std::string& kind) {
+    std::vector<std::string> found;
+    for (std::size_t at = text.find(kind); at != std::string::npos; at = text.find(kind, at + 1)) {
+      found.push_back(text.substr(at, text.find(';', at) - at));
+    }
+    return found;
+  };
+  std::vector<std::string> points = entities("CARTESIAN_POINT(");
+  const std::size_t all = points.size();
+  std::sort(points.begin(), points.end());
+  const auto distinct =
+      static_cast<std::size_t>(std::unique(points.begin(), points.end()) - points.begin());
+  // Vertices, planes and lines have points of their own.
+  const std::size_t own = entities("VERTEX_POINT(").size() +
+                          entities("AXIS2_PLACEMENT_3D(").size() + entities("= LINE(").size();
+  EXPECT_GT(distinct, 2 * own);
+  EXPECT_LE(all, distinct + own);
 }
 
 TEST_F(CadFiles, AreNotLeftHalfWrittenWhenStopped) {
