@@ -22,7 +22,9 @@ int run_convert(const ConvertArguments& arguments) {
   options.step_schema = step_schema(arguments.step_schema);
   Result<void> written;
   if (const auto* model = std::get_if<Model>(&*any)) {
-    written = export_model(*model, paths, options, console.progress());
+    const auto report = export_model(*model, paths, options, console.progress());
+    if (!report) return report_error(report.error());
+    for (const std::string& text : report->warnings) console.warn(text);
   } else if (const auto* solid = std::get_if<Solid>(&*any)) {
     written = export_solid(*solid, input.stem().string(), paths, options, console.progress());
   } else {

@@ -261,9 +261,9 @@ int run_fit(const FitArguments& arguments) {
   }
   watch.lap("read");
 
-  const auto fitted = arguments.solver.empty()
-                          ? fit_walls(*model, *image, arguments, console.progress())
-                          : fit_by_edges(*model, *image, arguments, console.progress());
+  auto fitted = arguments.solver.empty()
+                    ? fit_walls(*model, *image, arguments, console.progress())
+                    : fit_by_edges(*model, *image, arguments, console.progress());
   if (!fitted) {
     Error error = fitted.error();
     if (error.where == "fit") error.where = arguments.model + " in " + arguments.image;
@@ -277,9 +277,9 @@ int run_fit(const FitArguments& arguments) {
     truth = *compared;
     watch.lap("truth");
   }
-  const auto certificate =
-      finish_model(fitted->model, paths, arguments.step_schema, console, watch);
-  if (!certificate) return report_error(certificate.error());
+  const auto finished = finish_model(fitted->model, paths, arguments.step_schema, console, watch);
+  if (!finished) return report_error(finished.error());
+  append_warnings(fitted->model, finished->report);
   if (const auto written = write_residual(arguments.residual, fitted->model.name,
                                           fitted->residual_mesh, fitted->residual);
       !written) {
@@ -313,10 +313,10 @@ int run_fit(const FitArguments& arguments) {
     if (truth) add_truth(json, *truth);
     json["seconds"] = seconds_json(watch);
     json["files"] = files;
-    json["check"] = to_json(*certificate);
+    json["check"] = to_json(finished->certificate);
     print_json(json);
   }
-  return tell_outcome(fitted->model, *certificate, files, console);
+  return tell_outcome(fitted->model, finished->certificate, files, console);
 }
 
 }  // namespace angiospline::cli

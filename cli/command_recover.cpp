@@ -170,15 +170,17 @@ int run_recover(const RecoverArguments& arguments) {
   Stopwatch watch;
   const auto folder = OutputFolder::make(arguments.output_folder);
   if (!folder) return report_error(folder.error());
-  const auto recovered = recover(arguments, **folder, console.progress(), watch);
+  auto recovered = recover(arguments, **folder, console.progress(), watch);
   if (!recovered) return report_error(recovered.error());
 
   std::vector<fs::path> paths;
   for (const char* name : {"model.json", "model.step", "model.iges", "model.glb", "model.stl"}) {
     paths.push_back(**folder / name);
   }
-  const auto certificate = finish_model(recovered->model, paths, "AP242", console, watch);
-  if (!certificate) return report_error(certificate.error());
+  const auto finished = finish_model(recovered->model, paths, "AP242", console, watch);
+  if (!finished) return report_error(finished.error());
+  const Certificate& certificate = finished->certificate;
+  append_warnings(recovered->model, finished->report);
 
   std::vector<std::string> files;
   for (const char* name : {"mask.nrrd", "skeleton.nrrd", "centerlines.swc", "centerlines.vtp"}) {
@@ -187,7 +189,7 @@ int run_recover(const RecoverArguments& arguments) {
   for (const fs::path& path : paths) files.push_back(path.string());
   const fs::path report = **folder / "report.html";
   if (const auto written =
-          write_recovery_report(report, arguments, *recovered, *certificate, files, watch);
+          write_recovery_report(report, arguments, *recovered, certificate, files, watch);
       !written) {
     return report_error(written.error());
   }
@@ -200,10 +202,10 @@ int run_recover(const RecoverArguments& arguments) {
     json["contacts"] = contacts_json(recovered->vessels);
     json["seconds"] = seconds_json(watch);
     json["files"] = files;
-    json["check"] = to_json(*certificate);
+    json["check"] = to_json(certificate);
     print_json(json);
   }
-  return tell_outcome(recovered->model, *certificate, {arguments.output_folder}, console);
+  return tell_outcome(recovered->model, certificate, {arguments.output_folder}, console);
 }
 
 }  // namespace angiospline::cli

@@ -68,16 +68,17 @@ int run_seed(const SeedArguments& arguments) {
   };
   const auto finished = finish_model(*model, paths, arguments.step_schema, console, watch, measure);
   if (!finished) return report_error(finished.error());
+  append_warnings(*model, finished->report);
   if (arguments.json) {
     Json json = model_json(*model);
     json["seconds"] = seconds_json(watch);
     json["files"] = arguments.outputs;
     json["fidelity"] = fidelity_json(fidelity);
-    json["check"] = to_json(*finished);
+    json["check"] = to_json(finished->certificate);
     print_json(json);
   }
   console.say(to_text(fidelity));
-  return tell_outcome(*model, *finished, arguments.outputs, console);
+  return tell_outcome(*model, finished->certificate, arguments.outputs, console);
 }
 
 }  // namespace angiospline::cli

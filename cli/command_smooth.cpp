@@ -94,15 +94,16 @@ int run_smooth(const SmoothArguments& arguments) {
   const bool all = tell_parts(*smoothed, *model, console);
   const auto finished = finish_model(*model, paths, arguments.step_schema, console, watch);
   if (!finished) return report_error(finished.error());
+  append_warnings(*model, finished->report);
   if (arguments.json) {
     Json json = model_json(*model);
     json["smoothing"] = smoothing_json(*smoothed);
     json["seconds"] = seconds_json(watch);
     json["files"] = arguments.outputs;
-    json["check"] = to_json(*finished);
+    json["check"] = to_json(finished->certificate);
     print_json(json);
   }
-  const int outcome = tell_outcome(*model, *finished, arguments.outputs, console);
+  const int outcome = tell_outcome(*model, finished->certificate, arguments.outputs, console);
   return all ? outcome : kFailure;
 }
 

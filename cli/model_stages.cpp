@@ -25,10 +25,10 @@ StepSchema step_schema(const std::string& name) {
   return name == "AP214" ? StepSchema::kAp214 : StepSchema::kAp242;
 }
 
-Result<Certificate> finish_model(const Model& model,
-                                 const std::vector<std::filesystem::path>& paths,
-                                 const std::string& schema, const Console& console,
-                                 Stopwatch& watch, const std::function<void()>& meanwhile) {
+Result<FinishedModel> finish_model(const Model& model,
+                                   const std::vector<std::filesystem::path>& paths,
+                                   const std::string& schema, const Console& console,
+                                   Stopwatch& watch, const std::function<void()>& meanwhile) {
   ExportOptions options;
   options.step_in_side_process = true;
   options.step_schema = step_schema(schema);
@@ -41,10 +41,15 @@ Result<Certificate> finish_model(const Model& model,
     watch.lap("check");
     if (meanwhile) meanwhile();
   };
-  const auto written = export_model(model, paths, options, console.progress(), check);
+  auto written = export_model(model, paths, options, console.progress(), check);
   watch.lap("wait for files");
   if (!written) return fail(written.error());
-  return *std::move(certificate);
+  if (!*certificate) return fail(certificate->error());
+  return FinishedModel{**std::move(certificate), *std::move(written)};
+}
+
+void append_warnings(Model& model, const ExportReport& report) {
+  model.warnings.insert(model.warnings.end(), report.warnings.begin(), report.warnings.end());
 }
 
 int tell_outcome(const Model& model, const Certificate& certificate,

@@ -6,7 +6,9 @@
 #include <optional>
 #include <system_error>
 #include <thread>
+#include <utility>
 
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include "io/brep_file.h"
@@ -78,15 +80,15 @@ Error unknown_suffix(const fs::path& path, ErrorKind kind, const std::string& kn
   return {kind, "unknown model format", path.string(), path.extension().string(), known};
 }
 
-Result<void> write_solid(const Solid& solid, const std::string& name, const fs::path& path,
+Result<void> write_solid(Solid solid, const std::string& name, const fs::path& path,
                          const ExportOptions& options, const Progress& progress) {
   switch (*format_of(path)) {
     case Format::kStep:
-      return write_step(solid, path, {options.step_schema, name}, progress);
+      return write_step(std::move(solid), path, {options.step_schema, name}, progress);
     case Format::kIges:
-      return write_iges(solid, path, {name}, progress);
+      return write_iges(std::move(solid), path, {name}, progress);
     default:
-      return write_brep(solid, path, progress);
+      return write_brep(std::move(solid), path, progress);
   }
 }
 
@@ -119,40 +121,79 @@ Result<void> write_measured_report(const fs::path& path, const Model& model,
   return write_report(path, model, mesh, extras);
 }
 
-// Whether a second process has a processor to run on.
-bool may_work_aside() {
+// Control points from which on files are written one after the other: each takes some 4 GB a
+// million.
+constexpr Eigen::Index kMostAside = 500'000;
+
+// Whether a second process has a processor to run on, and both have the memory.
+bool may_work_aside(const Model& model) {
   return std::thread::hardware_concurrency() > 1 &&
-         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) > 1;
+         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism) > 1 &&
+         model.network.control_points_mm.cols() <= kMostAside;
 }
 
-// The files of one model; solids and triangles are made when the first of them asks.
+std::string coarsened(const TessellationOptions& asked, const TessellationOptions& used) {
+  return fmt::format(
+      "triangles of .glb, .stl, .vtp, .vtu: tolerance {:.6g} of the local radius instead of "
+      "{:.6g}, "
+      "so that there are at most {:.0f}",
+      used.chord_tolerance, asked.chord_tolerance, asked.most_triangles);
+}
+
+// The files of one model, in their order; solids and triangles are made when the first of them asks
+// and let go with the last that needs them.
 class ModelWriter {
  public:
-  ModelWriter(const Model& model, const std::vector<fs::path>& paths, const ExportOptions& options,
-              const Progress& progress)
-      : model_(model), paths_(paths), options_(options), progress_(progress) {}
+  // `step`: the file that a script for Gmsh loads, if there is one.
+  ModelWriter(const Model& model, std::vector<fs::path> paths, std::optional<fs::path> step,
+              const ExportOptions& options, const Progress& progress)
+      : model_(model),
+        paths_(std::move(paths)),
+        step_(std::move(step)),
+        options_(options),
+        progress_(progress) {}
 
-  Result<void> write(const fs::path& path) {
-    const Format format = *format_of(path);
-    if (needs_solid(format)) {
-      const auto solid = solid_for(format);
-      if (!solid) return fail(solid.error());
-      return format == Format::kGmsh ? write_gmsh_script(**solid, *step_among(paths_), path)
-                                     : write_solid(**solid, model_.name, path, options_, progress_);
+  Result<ExportReport> write() {
+    for (std::size_t k = 0; k < paths_.size(); ++k) {
+      progress_.at("writing " + paths_[k].filename().string(),
+                   static_cast<double>(k) / static_cast<double>(paths_.size()));
+      if (progress_.should_stop()) return fail(cancelled("writing"));
+      if (auto written = write(k); !written) return fail(written.error());
     }
-    if (format == Format::kNative) return write_model(path, model_);
-    if (!mesh_) {
-      auto made = tessellate(model_.network, options_.tessellation, progress_);
-      if (!made) return fail(made.error());
-      mesh_ = std::move(made->mesh);
-    }
-    return format == Format::kReport ? write_measured_report(path, model_, *mesh_, progress_)
-                                     : write_triangles(*mesh_, model_.name, path);
+    return std::move(report_);
   }
 
  private:
-  Result<const Solid*> solid_for(Format format) {
-    const bool short_edges = wants_short_edges(format);
+  Result<void> write(std::size_t k) {
+    const fs::path& path = paths_[k];
+    const Format format = *format_of(path);
+    if (format == Format::kNative) return write_model(path, model_);
+    if (needs_solid(format)) {
+      auto solid = solid_for(k);
+      if (!solid) return fail(solid.error());
+      return format == Format::kGmsh
+                 ? write_gmsh_script(*solid, *step_, path)
+                 : write_solid(*std::move(solid), model_.name, path, options_, progress_);
+    }
+    if (auto made = need_mesh(); !made) return made;
+    auto written = format == Format::kReport
+                       ? write_measured_report(path, model_, *mesh_, progress_)
+                       : write_triangles(*mesh_, model_.name, path);
+    if (!is_wanted_after(k, [](Format f) { return !needs_solid(f) && f != Format::kNative; })) {
+      mesh_.reset();
+    }
+    return written;
+  }
+
+  template <typename Wants>
+  bool is_wanted_after(std::size_t k, const Wants& wants) const {
+    return std::any_of(paths_.begin() + static_cast<std::ptrdiff_t>(k) + 1, paths_.end(),
+                       [&](const fs::path& path) { return wants(*format_of(path)); });
+  }
+
+  // Made, kept or handed out for good.
+  Result<Solid> solid_for(std::size_t k) {
+    const bool short_edges = wants_short_edges(*format_of(paths_[k]));
     std::optional<Solid>& solid = solids_[short_edges ? 1 : 0];
     if (!solid) {
       SurfaceNetwork turned = turn_long_patches(model_.network);
@@ -161,15 +202,30 @@ class ModelWriter {
       if (!made) return fail(made.error());
       solid = std::move(*made);
     }
-    return &*solid;
+    const bool again = is_wanted_after(
+        k, [&](Format f) { return needs_solid(f) && wants_short_edges(f) == short_edges; });
+    return again ? *solid : *std::exchange(solid, std::nullopt);
+  }
+
+  Result<void> need_mesh() {
+    if (mesh_) return {};
+    auto made = tessellate(model_.network, options_.tessellation, progress_);
+    if (!made) return fail(made.error());
+    if (made->used.chord_tolerance > options_.tessellation.chord_tolerance) {
+      report_.warnings.push_back(coarsened(options_.tessellation, made->used));
+    }
+    mesh_ = std::move(made->mesh);
+    return {};
   }
 
   const Model& model_;
   const std::vector<fs::path> paths_;
+  const std::optional<fs::path> step_;
   const ExportOptions& options_;
   const Progress& progress_;
   std::array<std::optional<Solid>, 2> solids_;  // with the network's own edges; with short ones
   std::optional<TriangleMesh> mesh_;
+  ExportReport report_;
 };
 
 }  // namespace
@@ -199,12 +255,13 @@ Result<void> check_export_target(const fs::path& path) {
   return {};
 }
 
-Result<void> export_model(const Model& model, const std::vector<fs::path>& paths,
-                          const ExportOptions& options, const Progress& progress,
-                          const std::function<void()>& meanwhile) {
+Result<ExportReport> export_model(const Model& model, const std::vector<fs::path>& paths,
+                                  const ExportOptions& options, const Progress& progress,
+                                  const std::function<void()>& meanwhile) {
+  const std::optional<fs::path> step = step_among(paths);
   for (const fs::path& path : paths) {
-    if (auto target = check_export_target(path); !target) return target;
-    if (*format_of(path) == Format::kGmsh && !step_among(paths)) {
+    if (auto target = check_export_target(path); !target) return fail(target.error());
+    if (*format_of(path) == Format::kGmsh && !step) {
       return fail({ErrorKind::kBadInput,
                    "no STEP file for the script",
                    path.string(),
@@ -212,23 +269,22 @@ Result<void> export_model(const Model& model, const std::vector<fs::path>& paths
                    "a .geo script loads a .step that is written with it"});
     }
   }
-  const std::optional<fs::path> step = step_among(paths);
-  const bool aside =
-      options.step_in_side_process && step && (paths.size() > 1 || meanwhile) && may_work_aside();
-  const SideProcess::Work write_step_file = [&](const Progress& its_own) {
-    return ModelWriter(model, {*step}, options, its_own).write(*step);
+  const bool aside = options.step_in_side_process && step && (paths.size() > 1 || meanwhile) &&
+                     may_work_aside(model);
+  const SideProcess::Work write_step_file = [&](const Progress& its_own) -> Result<void> {
+    const auto written = ModelWriter(model, {*step}, step, options, its_own).write();
+    return written ? Result<void>() : fail(written.error());
   };
   std::optional<SideProcess> copy = aside ? SideProcess::start(write_step_file) : std::nullopt;
-  ModelWriter writer(model, paths, options, progress);
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    progress.at("writing " + paths[i].filename().string(),
-                static_cast<double>(i) / static_cast<double>(paths.size()));
-    if (progress.should_stop()) return fail(cancelled("writing"));
-    if (copy && paths[i] == *step) continue;
-    if (auto written = writer.write(paths[i]); !written) return written;
-  }
+  std::vector<fs::path> here = paths;
+  if (copy) std::erase(here, *step);
+  auto report = ModelWriter(model, std::move(here), step, options, progress).write();
+  if (!report) return report;
   if (meanwhile) meanwhile();
-  return copy ? copy->wait(progress) : Result<void>();
+  if (copy) {
+    if (auto written = copy->wait(progress); !written) return fail(written.error());
+  }
+  return report;
 }
 
 Result<void> export_solid(const Solid& solid, const std::string& name,

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <locale>
 #include <numbers>
 #include <numeric>
+#include <sstream>
+#include <string>
 
 #include <Eigen/Geometry>
 
@@ -15,7 +18,21 @@
 namespace angiospline {
 namespace {
 
-constexpr double kMostTriangles = 2e7;  // some 3 GB; a whole brain at the defaults needs 1e6
+// Tolerances are coarsened to so many digits, upward.
+constexpr int kToleranceDigits = 2;
+
+double rounded_up(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) + 1 - kToleranceDigits);
+  return std::ceil(value / unit) * unit;
+}
+
+// All tolerances times `factor`; edges, whose squares they bound, by its root.
+TessellationOptions coarser(TessellationOptions options, double factor) {
+  options.chord_tolerance *= factor;
+  options.chord_tolerance_mm *= factor;
+  options.longest_edge *= std::sqrt(factor);
+  return options;
+}
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -43,10 +60,11 @@ class Tessellator {
 
   Result<Tessellation> run(const Progress& progress) {
     measure_spacings();
-    const double estimate = triangle_estimate();
-    if (!(estimate <= kMostTriangles)) {
-      return fail({ErrorKind::kBadInput, "the tolerance asks for too many triangles", "tessellate",
-                   std::to_string(estimate), "at most " + std::to_string(kMostTriangles)});
+    if (const double estimate = triangle_estimate(); !(estimate <= options_.most_triangles)) {
+      const TessellationOptions asked = options_;
+      if (!coarsen(progress)) return fail(cancelled("tessellate"));
+      const bool fits = triangle_estimate() <= options_.most_triangles;
+      if (!fits || !asked.coarsen) return fail(too_many(estimate, fits));
     }
     collect_edges();
     number_corners();
@@ -70,7 +88,41 @@ class Tessellator {
     return 0.05 * (p.rowwise().maxCoeff() - p.rowwise().minCoeff()).norm();
   }
 
+  // Makes the tolerance coarser until the triangles fit, or until that helps no more: three lines a
+  // patch are the least. The triangles fall no faster than the tolerance grows, so it ends little
+  // above the least that fits. False if stopped.
+  bool coarsen(const Progress& progress) {
+    constexpr int kTries = 24;
+    double factor = 1;
+    const TessellationOptions asked = options_;
+    for (int k = 0; k < kTries; ++k) {
+      const double excess = triangle_estimate() / asked.most_triangles;
+      if (excess <= 1) break;
+      if (progress.should_stop()) return false;
+      factor *= std::max(excess, 1.01);
+      factor = rounded_up(asked.chord_tolerance * factor) / asked.chord_tolerance;
+      options_ = coarser(asked, factor);
+      measure_spacings();
+    }
+    return true;
+  }
+
+  Error too_many(double estimate, bool fits) const {
+    std::string rule = "at most " + std::to_string(std::llround(options_.most_triangles));
+    if (fits) {
+      std::ostringstream text;
+      text.imbue(std::locale::classic());
+      text << ", as with a tolerance of " << options_.chord_tolerance
+           << " local radii and edges of up to " << options_.longest_edge;
+      rule += text.str();
+    }
+    return {ErrorKind::kBadInput, "the tolerance asks for too many triangles", "tessellate",
+            std::to_string(std::llround(std::min(estimate, 1e18))), std::move(rule)};
+  }
+
   void measure_spacings() {
+    surfaces_.clear();
+    spacings_.clear();
     const double fallback = fallback_radius_mm();
     for (std::size_t p = 0; p < network_.patches.size(); ++p) {
       surfaces_.push_back(patch_surface(network_, static_cast<int>(p)));
@@ -84,6 +136,15 @@ class Tessellator {
     double sum = 0;
     for (const PatchSpacing& d : spacings_) {
       sum += 2 * (d.u.integral() + 3) * (d.v.integral() + 3);
+    }
+    for (const Rim& rim : network_.rims) {
+      double segments = 0;
+      for (const Side& side : rim.sides) {
+        const Density& density = density_along(side);
+        const double width = density.parameters.back() - density.parameters.front();
+        segments += density.integral() * (side.to - side.from) / width + 1;
+      }
+      sum += segments + segments * segments / (2 * std::numbers::pi);  // rings that get shorter
     }
     return sum;
   }
@@ -398,12 +459,16 @@ class Tessellator {
       mesh.points_mm.col(k) = points_[static_cast<std::size_t>(k)];
       mesh.normals.col(k) = normals_[static_cast<std::size_t>(k)].normalized();
     }
+    points_ = {};  // large meshes are not held twice
+    normals_ = {};
     mesh.triangles.resize(3, static_cast<Eigen::Index>(triangles_.size()));
     for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
       const auto& [a, b, c] = triangles_[static_cast<std::size_t>(t)];
       mesh.triangles.col(t) << a, b, c;
     }
+    triangles_ = {};
     mesh.part_of = std::move(part_of_);
+    result.used = options_;
     result.origins = std::move(origins_);
     for (const Region& region : network_.regions) {
       const bool body = region.kind == RegionKind::kBody;
@@ -420,7 +485,7 @@ class Tessellator {
   }
 
   const SurfaceNetwork& network_;
-  const TessellationOptions& options_;
+  TessellationOptions options_;
   std::vector<BSplineSurface<3>> surfaces_;
   std::vector<PatchSpacing> spacings_;
   std::vector<Edge> edges_;
@@ -437,7 +502,7 @@ class Tessellator {
 Result<Tessellation> tessellate(const SurfaceNetwork& network, const TessellationOptions& options,
                                 const Progress& progress) {
   EXPECTS(options.chord_tolerance > 0 && options.chord_tolerance_mm > 0 &&
-          options.longest_edge > 0);
+          options.longest_edge > 0 && options.most_triangles > 0);
   if (auto defect = find_defect(network)) return fail(*defect);
   return Tessellator(network, options).run(progress);
 }

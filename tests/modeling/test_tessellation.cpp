@@ -1,5 +1,7 @@
 #include <cmath>
 #include <numbers>
+#include <sstream>
+#include <string>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -174,6 +176,39 @@ TEST(Tessellate, RefusesWhatIsBrokenOrTooFineOrStopped) {
   const Progress stop{{}, [] { return true; }};
   ASSERT_FALSE(tessellate(samples::tube(), {}, stop));
   EXPECT_EQ(tessellate(samples::tube(), {}, stop).error().kind, ErrorKind::kCancelled);
+}
+
+TEST(Tessellate, CoarsensByNoMoreThanItMustWhereItMay) {
+  const SurfaceNetwork network = samples::bent_tube();
+  const auto fine = tessellate(network, {.chord_tolerance = 1e-4});
+  ASSERT_TRUE(fine);
+  const auto triangles = static_cast<double>(fine->mesh.triangles.cols());
+  EXPECT_EQ(fine->used.chord_tolerance, 1e-4);
+  TessellationOptions options{
+      .chord_tolerance = 1e-4, .most_triangles = triangles / 10, .coarsen = true};
+  const auto coarse = tessellate(network, options);
+  ASSERT_TRUE(coarse) << coarse.error().message();
+  EXPECT_TRUE(measure(coarse->mesh).closed());
+  EXPECT_LE(static_cast<double>(coarse->mesh.triangles.cols()), options.most_triangles);
+  EXPECT_GE(static_cast<double>(coarse->mesh.triangles.cols()), 0.7 * options.most_triangles);
+  EXPECT_GT(coarse->used.chord_tolerance, 8e-4);
+  EXPECT_LT(coarse->used.chord_tolerance, 2e-3);
+
+  // The same as an error names the tolerance that fits, and it does.
+  options.coarsen = false;
+  const auto refused = tessellate(network, options);
+  ASSERT_FALSE(refused);
+  std::ostringstream tolerance;
+  tolerance << "a tolerance of " << coarse->used.chord_tolerance << " local radii";
+  EXPECT_NE(refused.error().rule.find(tolerance.str()), std::string::npos) << refused.error().rule;
+  options.chord_tolerance = coarse->used.chord_tolerance;
+  options.longest_edge = coarse->used.longest_edge;
+  EXPECT_TRUE(tessellate(network, options));
+
+  // No tolerance makes so few.
+  const auto never = tessellate(network, {.most_triangles = 10, .coarsen = true});
+  ASSERT_FALSE(never);
+  EXPECT_EQ(never.error().rule, "at most 10");
 }
 
 TEST(Measure, SeesHolesFlipsAndPinchedPoints) {
