@@ -32,4 +32,18 @@ GaussRule gauss_legendre(int count) {
   return rule;
 }
 
+PiecewiseRule gauss_legendre(const std::vector<double>& breaks, int count) {
+  const GaussRule rule = gauss_legendre(count);
+  PiecewiseRule result;
+  for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
+    const double half = (breaks[k + 1] - breaks[k]) / 2;
+    const double mid = (breaks[k + 1] + breaks[k]) / 2;
+    for (Eigen::Index i = 0; i < rule.nodes.size(); ++i) {
+      result.nodes.push_back(mid + half * rule.nodes(i));
+      result.weights.push_back(half * rule.weights(i));
+    }
+  }
+  return result;
+}
+
 }  // namespace angiospline

@@ -1,6 +1,8 @@
 // Gauss-Legendre quadrature.
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 namespace angiospline {
@@ -13,5 +15,13 @@ struct GaussRule {
 
 // Requires count >= 1. Newton on the Legendre recurrence; full double precision.
 GaussRule gauss_legendre(int count);
+
+// The rule of `count` points on each piece between consecutive breaks: exact for splines with these
+// knots. Requires count >= 1.
+struct PiecewiseRule {
+  std::vector<double> nodes;
+  std::vector<double> weights;
+};
+PiecewiseRule gauss_legendre(const std::vector<double>& breaks, int count);
 
 }  // namespace angiospline

@@ -43,25 +43,6 @@ std::vector<double> span_samples(const KnotVector& knots, int intervals) {
   return samples;
 }
 
-struct QuadraturePoints {
-  std::vector<double> nodes;
-  std::vector<double> weights;
-};
-
-QuadraturePoints quadrature(const std::vector<double>& breaks, int count) {
-  const GaussRule rule = gauss_legendre(count);
-  QuadraturePoints points;
-  for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
-    const double half = (breaks[k + 1] - breaks[k]) / 2;
-    const double mid = (breaks[k + 1] + breaks[k]) / 2;
-    for (Eigen::Index i = 0; i < rule.nodes.size(); ++i) {
-      points.nodes.push_back(mid + half * rule.nodes(i));
-      points.weights.push_back(half * rule.weights(i));
-    }
-  }
-  return points;
-}
-
 // The volume under a polynomial patch, S . (Su x Sv) / 3, has degree 3p - 1 in each direction, so
 // that Gauss's rule of (3p + 1) / 2 points is exact; areas converge with it.
 int gauss_points(int degree) { return (3 * degree + 1) / 2; }
@@ -93,8 +74,10 @@ Vec3 refine_extreme(const BSplineSurface<3>& patch, double u, double v, double s
 FaceMeasure measure_patch(const BoundaryFace& face, int intervals) {
   const BSplineSurface<3>& patch = *face.patch;
   FaceMeasure result;
-  const QuadraturePoints qu = quadrature(patch.u().breakpoints(), gauss_points(patch.u().degree()));
-  const QuadraturePoints qv = quadrature(patch.v().breakpoints(), gauss_points(patch.v().degree()));
+  const PiecewiseRule qu =
+      gauss_legendre(patch.u().breakpoints(), gauss_points(patch.u().degree()));
+  const PiecewiseRule qv =
+      gauss_legendre(patch.v().breakpoints(), gauss_points(patch.v().degree()));
   const SurfaceGrid<3> inner = evaluate_grid(patch, qu.nodes, qv.nodes, 1);
   for (std::size_t i = 0; i < qu.nodes.size(); ++i) {
     for (std::size_t j = 0; j < qv.nodes.size(); ++j) {
@@ -151,7 +134,7 @@ FaceMeasure measure_other(const BoundaryFace& face) {
 void add_plane_share(const BoundaryFace& face, const BoundaryEdge& edge, const EdgeUse& use,
                      FaceMeasure& measure) {
   const auto& [center, normal] = *face.plane;
-  const QuadraturePoints q = quadrature(edge.breaks, kGaussPoints);
+  const PiecewiseRule q = gauss_legendre(edge.breaks, kGaussPoints);
   double area = 0.0;
   for (std::size_t k = 0; k < q.nodes.size(); ++k) {
     const EdgePoint<Vec3> p = edge.point(q.nodes[k]);
@@ -206,7 +189,7 @@ Vec2 strip_to(const BoundaryFace& face, const Vec2& uv) {
     }
   }
   breaks.push_back(last);
-  const QuadraturePoints q = quadrature(breaks, kGaussPoints);
+  const PiecewiseRule q = gauss_legendre(breaks, kGaussPoints);
   Vec2 sum = Vec2::Zero();
   for (std::size_t k = 0; k < q.nodes.size(); ++k) {
     const SurfaceJet jet = face.jet(q.nodes[k], uv.y());
@@ -221,7 +204,7 @@ Vec2 strip_to(const BoundaryFace& face, const Vec2& uv) {
 void add_trimmed_share(const BoundaryFace& face, const BoundaryEdge& edge, const EdgeUse& use,
                        FaceMeasure& measure) {
   if (!use.parameters) return;
-  const QuadraturePoints q = quadrature(edge.breaks, kGaussPoints);
+  const PiecewiseRule q = gauss_legendre(edge.breaks, kGaussPoints);
   Vec2 sum = Vec2::Zero();
   for (std::size_t k = 0; k < q.nodes.size(); ++k) {
     const EdgePoint<Vec2> p = use.parameters(q.nodes[k]);

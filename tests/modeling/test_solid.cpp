@@ -183,6 +183,34 @@ TEST(MakeSolid, RefusesWallsThatAreInsideOut) {
   EXPECT_EQ(solid.error().what, "component is inside out");
 }
 
+// A bulb on a very long, very thin stem: the cones from the stem's foot to its faces cancel to a
+// millionth, as they do in a component of ten thousand branches.
+SurfaceNetwork bulb_on_a_stem(double stem_mm) {
+  SurfaceNetwork network = samples::tube(1.0, 5.0, 40);
+  Points3& points = network.control_points_mm;
+  const double foot = points.row(2).minCoeff(), length = points.row(2).maxCoeff() - foot;
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    const double along = (points(2, k) - foot) / length;
+    points(2, k) = stem_mm * std::min(2 * along, 1.0) + along;
+    points.col(k).head<2>() *= std::clamp(4 * (along - 0.5), 1e-3, 1.0);
+  }
+  for (Rim& rim : network.rims) {
+    rim.center_mm.z() = rim.center_mm.z() - foot < length / 2 ? 0.0 : stem_mm + 1.0;
+  }
+  return network;
+}
+
+TEST(MakeSolid, SeesTheSideOfAWallWhoseVolumeCancels) {
+  for (const double stem_mm : {1.0, 1e3, 1e5}) {
+    SurfaceNetwork network = bulb_on_a_stem(stem_mm);
+    const Result<Solid> solid = make_solid(network);
+    EXPECT_TRUE(solid) << stem_mm << ": " << solid.error().message();
+    network.control_points_mm.row(0) *= -1;
+    for (Rim& rim : network.rims) rim.center_mm.x() *= -1;
+    EXPECT_FALSE(make_solid(network)) << stem_mm;
+  }
+}
+
 TEST(MakeSolid, RefusesPatchesWhoseNormalsDisagree) {
   SurfaceNetwork network = crafted::sheared_tube(1, 6);
   // Turn patch 1 inside out: transpose its net, and with it the sides that name it.
