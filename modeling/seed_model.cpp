@@ -17,6 +17,7 @@
 #include "modeling/body_path.h"
 #include "modeling/keep_apart.h"
 #include "modeling/make_room.h"
+#include "modeling/round_tree.h"
 #include "modeling/seed_plan.h"
 
 namespace angiospline {
@@ -703,14 +704,11 @@ Result<Model> seed_model(const CenterlineTree& tree, const SeedOptions& options,
 
 Result<SmoothedTree> smooth_for_seed(const CenterlineTree& tree, const SeedOptions& options,
                                      const Progress& progress) {
-  Result<SmoothedTree> smoothed = smooth_centerlines(tree, options.smoothing, progress);
-  if (!smoothed) return smoothed;
-  if (options.clearance) {
-    KeepApartOptions apart;
-    apart.clearance = *options.clearance;
-    smoothed = keep_apart(*std::move(smoothed), apart);
-  }
-  return smoothed;
+  Result<SmoothedTree> smoothed = smooth_centerlines(rounded(tree), options.smoothing, progress);
+  if (!smoothed || !options.clearance) return smoothed;
+  KeepApartOptions apart;
+  apart.clearance = *options.clearance;
+  return keep_apart(*std::move(smoothed), apart);
 }
 
 namespace {

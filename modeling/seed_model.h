@@ -35,7 +35,8 @@ struct SeedOptions {
 Result<Model> seed_model(const CenterlineTree& tree, const SeedOptions& options = {},
                          const Progress& progress = {});
 
-// The first half of it: the tree smoothed and, if asked for, kept apart.
+// The first half of it: the tree rounded to what no unit of length changes (modeling/round_tree.h),
+// smoothed and, if asked for, kept apart.
 Result<SmoothedTree> smooth_for_seed(const CenterlineTree& tree, const SeedOptions& options = {},
                                      const Progress& progress = {});
 

@@ -7,6 +7,7 @@
 #include "base/random.h"
 #include "modeling/clean_tree.h"
 #include "modeling/point_graph.h"
+#include "modeling/round_tree.h"
 #include "modeling/smooth_centerlines.h"
 
 namespace angiospline {
@@ -249,6 +250,43 @@ TEST(CleanTree, ARingKeepsOneNode) {
   EXPECT_EQ(cycle_count(cleaned.tree), 1);
   const auto smooth = smooth_centerlines(cleaned.tree);
   ASSERT_TRUE(smooth.has_value());
+}
+
+// ---- rounding
+
+CenterlineTree scaled(CenterlineTree tree, double by) {
+  for (CenterlineNode& node : tree.nodes) node.position_mm *= by;
+  for (CenterlineBranch& branch : tree.branches) {
+    branch.points_mm *= by;
+    branch.radii_mm *= by;
+  }
+  return tree;
+}
+
+TEST(Rounded, GivesTheSameNumbersWhateverUnitTheyCameIn) {
+  PointGraph graph;
+  add_line(graph, 200, -1, helix);
+  const CenterlineTree given = tree_of(graph);
+  const CenterlineTree once = rounded(given);
+  EXPECT_NE(once.branches[0].points_mm, given.branches[0].points_mm);
+  EXPECT_LT((once.branches[0].points_mm - given.branches[0].points_mm).cwiseAbs().maxCoeff(),
+            20 * 0x1p-30);
+  EXPECT_LT(((once.branches[0].radii_mm - given.branches[0].radii_mm).array() /
+             given.branches[0].radii_mm.array())
+                .abs()
+                .maxCoeff(),
+            0x1p-30);
+  for (const double unit : {1e-3, 0.1, 1e3, 1e6, 25.4}) {
+    const CenterlineTree back = scaled(scaled(given, 1 / unit), unit);
+    EXPECT_NE(back.branches[0].points_mm, given.branches[0].points_mm) << unit;
+    const CenterlineTree same = rounded(back);
+    EXPECT_EQ(same.branches[0].points_mm, once.branches[0].points_mm) << unit;
+    EXPECT_EQ(same.branches[0].radii_mm, once.branches[0].radii_mm) << unit;
+    EXPECT_EQ(same.nodes[0].position_mm, once.nodes[0].position_mm) << unit;
+  }
+  EXPECT_EQ(rounded(once).branches[0].points_mm, once.branches[0].points_mm);
+  EXPECT_EQ(rounded(scaled(given, 0x1p-20)).branches[0].points_mm,
+            0x1p-20 * once.branches[0].points_mm);
 }
 
 }  // namespace
