@@ -21,6 +21,7 @@
 #include "io/stl_file.h"
 #include "io/vtk_file.h"
 #include "modeling/certificate.h"
+#include "modeling/order_patches.h"
 #include "modeling/split_joins.h"
 #include "modeling/tessellate_solid.h"
 #include "modeling/turn_patches.h"
@@ -196,9 +197,9 @@ class ModelWriter {
     const bool short_edges = wants_short_edges(*format_of(paths_[k]));
     std::optional<Solid>& solid = solids_[short_edges ? 1 : 0];
     if (!solid) {
-      SurfaceNetwork turned = turn_long_patches(model_.network);
-      auto made = make_solid(short_edges ? split_joins(std::move(turned), options_.edges)
-                                         : std::move(turned));
+      SurfaceNetwork network = order_by_neighbours(turn_long_patches(model_.network));
+      auto made = make_solid(short_edges ? split_joins(std::move(network), options_.edges)
+                                         : std::move(network));
       if (!made) return fail(made.error());
       solid = std::move(*made);
     }

@@ -1,6 +1,14 @@
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "modeling/certificate.h"
+#include "modeling/order_patches.h"
+#include "modeling/point_graph.h"
+#include "modeling/seed_model.h"
 #include "modeling/solid.h"
 #include "modeling/split_joins.h"
 #include "modeling/turn_patches.h"
@@ -93,6 +101,67 @@ TEST(SplitJoins, DoesNotDependOnScale) {
   for (std::size_t k = 0; k < small.joins.size(); ++k) {
     EXPECT_NEAR(small.joins[k].a.to, large.joins[k].a.to, 1e-9);
   }
+}
+
+TEST(OrderByNeighbours, KeepsTheLawsAndTheSolid) {
+  for (const SurfaceNetwork& network : networks()) {
+    const SurfaceNetwork ordered = order_by_neighbours(network);
+    const auto defect = find_defect(ordered);
+    EXPECT_FALSE(defect) << defect->message();
+    EXPECT_EQ(ordered.patches.size(), network.patches.size());
+    const auto a = certify(network);
+    const auto b = certify(ordered);
+    ASSERT_TRUE(a && b);
+    EXPECT_TRUE(b->closed && b->valid);
+    EXPECT_EQ(a->genus, b->genus);
+    EXPECT_NEAR(a->volume_mm3, b->volume_mm3, 1e-12 * a->volume_mm3);
+  }
+}
+
+// A trunk with a twig at every ten radii.
+SurfaceNetwork comb(int twigs) {
+  PointGraph graph;
+  const auto add = [&](const Vec3& at, double radius, int after) {
+    const int id = static_cast<int>(graph.points.size());
+    graph.points.push_back({std::to_string(id), at, radius});
+    if (after >= 0) graph.edges.emplace_back(after, id);
+    return id;
+  };
+  int trunk = add(Vec3::Zero(), 1.0, -1);
+  for (int k = 0; k < twigs; ++k) {
+    trunk = add(Vec3(0, 0, 10 * (k + 0.5)), 1.0, trunk);
+    trunk = add(Vec3(0, 0, 10 * (k + 1.0)), 1.0, trunk);
+    const int twig = add(Vec3(5, 0, 10 * (k + 1.0) + 2), 0.6, trunk);
+    add(Vec3(9, 0, 10 * (k + 1.0) + 3), 0.6, twig);
+  }
+  add(Vec3(0, 0, 10 * (twigs + 1.0)), 1.0, trunk);
+  return seed_model(tree_from_points(graph).value()).value().network;
+}
+
+TEST(OrderByNeighbours, PutsNeighboursNearEachOther) {
+  const auto longest_jump = [](const SurfaceNetwork& network) {
+    int longest = 0;
+    for (const Join& join : network.joins) {
+      longest = std::max(longest, std::abs(join.a.patch - join.b.patch));
+    }
+    return longest;
+  };
+  const SurfaceNetwork given = comb(20);
+  const SurfaceNetwork ordered = order_by_neighbours(given);
+  EXPECT_GT(longest_jump(given), 100);   // all junctions stand before all bodies
+  EXPECT_LT(longest_jump(ordered), 20);  // a junction, its twig and its trunk
+  EXPECT_FALSE(find_defect(ordered));
+  for (std::size_t r = 1; r < ordered.rims.size(); ++r) {
+    EXPECT_LT(ordered.rims[r - 1].sides[0].patch, ordered.rims[r].sides[0].patch);
+  }
+  std::multiset<std::string> before, after;
+  for (const Patch& p : given.patches) {
+    before.insert(given.regions[static_cast<std::size_t>(p.region)].name);
+  }
+  for (const Patch& p : ordered.patches) {
+    after.insert(ordered.regions[static_cast<std::size_t>(p.region)].name);
+  }
+  EXPECT_EQ(before, after);
 }
 
 }  // namespace
