@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
 
 #include <Eigen/Geometry>
+#include <fmt/format.h>
 
 #include "kernel/grid.h"
 
@@ -120,6 +124,102 @@ PatchSpacing spacing_of(const BSplineSurface<3>& surface, double radius_mm,
     }
   }
   return spacing;
+}
+
+namespace {
+
+// Tolerances are coarsened to so many digits, upward.
+constexpr int kToleranceDigits = 2;
+
+double rounded_up(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) + 1 - kToleranceDigits);
+  return std::ceil(value / unit) * unit;
+}
+
+TessellationOptions coarser(TessellationOptions options, double factor) {
+  options.chord_tolerance *= factor;
+  options.chord_tolerance_mm *= factor;
+  options.longest_edge *= std::sqrt(factor);
+  return options;
+}
+
+// Of regions that know no radius of their own.
+double fallback_radius_mm(const SurfaceNetwork& network) {
+  double radius = 0;
+  for (const Rim& rim : network.rims) radius = std::max(radius, rim.radius_mm);
+  for (const Region& region : network.regions) radius = std::max(radius, region.radius_mm);
+  if (radius > 0) return radius;
+  const Points3& p = network.control_points_mm;
+  return 0.05 * (p.rowwise().maxCoeff() - p.rowwise().minCoeff()).norm();
+}
+
+std::vector<PatchSpacing> spacings_of(const SurfaceNetwork& network,
+                                      const std::vector<BSplineSurface<3>>& surfaces,
+                                      const TessellationOptions& options) {
+  const double fallback = fallback_radius_mm(network);
+  std::vector<PatchSpacing> spacings;
+  spacings.reserve(surfaces.size());
+  for (std::size_t p = 0; p < surfaces.size(); ++p) {
+    const double known =
+        network.regions[static_cast<std::size_t>(network.patches[p].region)].radius_mm;
+    spacings.push_back(spacing_of(surfaces[p], known > 0 ? known : fallback, options));
+  }
+  return spacings;
+}
+
+double triangle_estimate(const SurfaceNetwork& network, const std::vector<PatchSpacing>& spacings) {
+  double sum = 0;
+  for (const PatchSpacing& d : spacings) sum += 2 * (d.u.integral() + 3) * (d.v.integral() + 3);
+  for (const Rim& rim : network.rims) {
+    double segments = 0;
+    for (const Side& side : rim.sides) {
+      const Density& density =
+          density_along(spacings[static_cast<std::size_t>(side.patch)], side.side);
+      const double width = density.parameters.back() - density.parameters.front();
+      segments += density.integral() * (side.to - side.from) / width + 1;
+    }
+    sum += segments + segments * segments / (2 * std::numbers::pi);  // rings that get shorter
+  }
+  return sum;
+}
+
+Error too_many(double estimate, const TessellationOptions& used, bool fits) {
+  std::string rule = fmt::format("at most {:.0f}", used.most_triangles);
+  if (fits) {
+    rule += fmt::format(", as with a tolerance of {:.6g} local radii and edges of up to {:.6g}",
+                        used.chord_tolerance, used.longest_edge);
+  }
+  return {ErrorKind::kBadInput, "the tolerance asks for too many triangles", "tessellate",
+          fmt::format("{:.0f}", estimate), std::move(rule)};
+}
+
+}  // namespace
+
+const Density& density_along(const PatchSpacing& spacing, PatchSide side) {
+  return side == PatchSide::kU0 || side == PatchSide::kU1 ? spacing.v : spacing.u;
+}
+
+Result<NetworkSpacing> spacing_of(const SurfaceNetwork& network,
+                                  const std::vector<BSplineSurface<3>>& surfaces,
+                                  const TessellationOptions& options, const Progress& progress) {
+  NetworkSpacing result{spacings_of(network, surfaces, options), options};
+  const double asked = triangle_estimate(network, result.patches);
+  double estimate = asked;
+  double factor = 1;
+  // Triangles fall no faster than the tolerance grows, so no step goes too far; three lines a patch
+  // stay whatever the tolerance is.
+  constexpr int kTries = 24;
+  for (int k = 0; k < kTries && !(estimate <= options.most_triangles); ++k) {
+    if (progress.should_stop()) return fail(cancelled("tessellate"));
+    factor *= std::max(estimate / options.most_triangles, 1.01);
+    factor = rounded_up(options.chord_tolerance * factor) / options.chord_tolerance;
+    result.used = coarser(options, factor);
+    result.patches = spacings_of(network, surfaces, result.used);
+    estimate = triangle_estimate(network, result.patches);
+  }
+  const bool fits = estimate <= options.most_triangles;
+  if (asked <= options.most_triangles || (fits && options.coarsen)) return result;
+  return fail(too_many(asked, result.used, fits));
 }
 
 }  // namespace angiospline

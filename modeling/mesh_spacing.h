@@ -3,7 +3,10 @@
 
 #include <vector>
 
+#include "base/progress.h"
+#include "base/result.h"
 #include "kernel/surface.h"
+#include "modeling/surface_network.h"
 #include "modeling/tessellation.h"
 
 namespace angiospline {
@@ -30,5 +33,22 @@ struct PatchSpacing {
 // the most that any point on it asks.
 PatchSpacing spacing_of(const BSplineSurface<3>& surface, double radius_mm,
                         const TessellationOptions& options);
+
+// Along a side: of v for sides u0 and u1.
+const Density& density_along(const PatchSpacing& spacing, PatchSide side);
+
+struct NetworkSpacing {
+  std::vector<PatchSpacing> patches;
+  TessellationOptions used;
+};
+
+// What the options ask of every patch, or coarser ones where they ask for more triangles than they
+// allow and may be coarsened: all tolerances times a factor, and edges, whose squares they bound,
+// by its root, so that the chord tolerance is little above the least of two digits that fits.
+// Requires one surface a patch. Errors: too many triangles, naming the tolerance that fits if there
+// is one; stopped on request.
+Result<NetworkSpacing> spacing_of(const SurfaceNetwork& network,
+                                  const std::vector<BSplineSurface<3>>& surfaces,
+                                  const TessellationOptions& options, const Progress& progress);
 
 }  // namespace angiospline

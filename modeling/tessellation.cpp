@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <locale>
 #include <numbers>
 #include <numeric>
-#include <sstream>
-#include <string>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -17,22 +15,6 @@
 
 namespace angiospline {
 namespace {
-
-// Tolerances are coarsened to so many digits, upward.
-constexpr int kToleranceDigits = 2;
-
-double rounded_up(double value) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)) + 1 - kToleranceDigits);
-  return std::ceil(value / unit) * unit;
-}
-
-// All tolerances times `factor`; edges, whose squares they bound, by its root.
-TessellationOptions coarser(TessellationOptions options, double factor) {
-  options.chord_tolerance *= factor;
-  options.chord_tolerance_mm *= factor;
-  options.longest_edge *= std::sqrt(factor);
-  return options;
-}
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -59,13 +41,13 @@ class Tessellator {
       : network_(network), options_(options) {}
 
   Result<Tessellation> run(const Progress& progress) {
-    measure_spacings();
-    if (const double estimate = triangle_estimate(); !(estimate <= options_.most_triangles)) {
-      const TessellationOptions asked = options_;
-      if (!coarsen(progress)) return fail(cancelled("tessellate"));
-      const bool fits = triangle_estimate() <= options_.most_triangles;
-      if (!fits || !asked.coarsen) return fail(too_many(estimate, fits));
+    for (std::size_t p = 0; p < network_.patches.size(); ++p) {
+      surfaces_.push_back(patch_surface(network_, static_cast<int>(p)));
     }
+    auto spacing = spacing_of(network_, surfaces_, options_, progress);
+    if (!spacing) return fail(spacing.error());
+    spacings_ = std::move(spacing->patches);
+    options_ = spacing->used;
     collect_edges();
     number_corners();
     sample_edges();
@@ -79,76 +61,6 @@ class Tessellator {
   }
 
  private:
-  double fallback_radius_mm() const {
-    double radius = 0;
-    for (const Rim& rim : network_.rims) radius = std::max(radius, rim.radius_mm);
-    for (const Region& region : network_.regions) radius = std::max(radius, region.radius_mm);
-    if (radius > 0) return radius;
-    const Points3& p = network_.control_points_mm;
-    return 0.05 * (p.rowwise().maxCoeff() - p.rowwise().minCoeff()).norm();
-  }
-
-  // Makes the tolerance coarser until the triangles fit, or until that helps no more: three lines a
-  // patch are the least. The triangles fall no faster than the tolerance grows, so it ends little
-  // above the least that fits. False if stopped.
-  bool coarsen(const Progress& progress) {
-    constexpr int kTries = 24;
-    double factor = 1;
-    const TessellationOptions asked = options_;
-    for (int k = 0; k < kTries; ++k) {
-      const double excess = triangle_estimate() / asked.most_triangles;
-      if (excess <= 1) break;
-      if (progress.should_stop()) return false;
-      factor *= std::max(excess, 1.01);
-      factor = rounded_up(asked.chord_tolerance * factor) / asked.chord_tolerance;
-      options_ = coarser(asked, factor);
-      measure_spacings();
-    }
-    return true;
-  }
-
-  Error too_many(double estimate, bool fits) const {
-    std::string rule = "at most " + std::to_string(std::llround(options_.most_triangles));
-    if (fits) {
-      std::ostringstream text;
-      text.imbue(std::locale::classic());
-      text << ", as with a tolerance of " << options_.chord_tolerance
-           << " local radii and edges of up to " << options_.longest_edge;
-      rule += text.str();
-    }
-    return {ErrorKind::kBadInput, "the tolerance asks for too many triangles", "tessellate",
-            std::to_string(std::llround(std::min(estimate, 1e18))), std::move(rule)};
-  }
-
-  void measure_spacings() {
-    surfaces_.clear();
-    spacings_.clear();
-    const double fallback = fallback_radius_mm();
-    for (std::size_t p = 0; p < network_.patches.size(); ++p) {
-      surfaces_.push_back(patch_surface(network_, static_cast<int>(p)));
-      const double known = network_.regions[at(network_.patches[p].region)].radius_mm;
-      const double radius = known > 0 ? known : fallback;
-      spacings_.push_back(spacing_of(surfaces_.back(), radius, options_));
-    }
-  }
-
-  double triangle_estimate() const {
-    double sum = 0;
-    for (const PatchSpacing& d : spacings_) {
-      sum += 2 * (d.u.integral() + 3) * (d.v.integral() + 3);
-    }
-    for (const Rim& rim : network_.rims) {
-      double segments = 0;
-      for (const Side& side : rim.sides) {
-        const Density& density = density_along(side);
-        const double width = density.parameters.back() - density.parameters.front();
-        segments += density.integral() * (side.to - side.from) / width + 1;
-      }
-      sum += segments + segments * segments / (2 * std::numbers::pi);  // rings that get shorter
-    }
-    return sum;
-  }
-
   void use(const Side& side, int edge, bool is_b) {
     uses_[at(side.patch)][static_cast<std::size_t>(side.side)].push_back({edge, is_b, side.from});
   }
@@ -229,8 +141,7 @@ class Tessellator {
   }
 
   const Density& density_along(const Side& side) const {
-    const PatchSpacing& spacing = spacings_[at(side.patch)];
-    return runs_along_v(side.side) ? spacing.v : spacing.u;
+    return angiospline::density_along(spacings_[at(side.patch)], side.side);
   }
 
   void sample_edges() {
