@@ -50,10 +50,6 @@ std::string plain(const TCollection_ExtendedString& text) {
   return result;
 }
 
-Quantity_Color occt_colour(const Vec3& c) {
-  return Quantity_Color(c.x(), c.y(), c.z(), Quantity_TOC_sRGB);
-}
-
 // Names and colours by the face's geometry, whatever its place in an assembly.
 struct FaceNote {
   std::optional<std::string> name;
@@ -145,6 +141,10 @@ tl::unexpected<Error> differs(const std::filesystem::path& path, std::string wha
 }
 
 }  // namespace
+
+Quantity_Color occt_colour(const Vec3& srgb) {
+  return Quantity_Color(srgb.x(), srgb.y(), srgb.z(), Quantity_TOC_sRGB);
+}
 
 std::unique_lock<std::mutex> lock_exchange() {
   static std::mutex mutex;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <Message_ProgressIndicator.hxx>
+#include <Quantity_Color.hxx>
 #include <TDocStd_Document.hxx>
 #include <TopoDS_Shape.hxx>
 #include <XSAlgo_AlgoContainer.hxx>
@@ -21,6 +22,9 @@ namespace angiospline {
 // OpenCASCADE's exchange settings are global to the process: every reader and writer holds this
 // lock, and its messages are kept off our streams.
 std::unique_lock<std::mutex> lock_exchange();
+
+// A colour of ours, red, green, blue in [0, 1] (sRGB).
+Quantity_Color occt_colour(const Vec3& srgb);
 
 // A new document with the solid under the product's name, and its faces' names and colours.
 Handle(TDocStd_Document) document_of(const Solid& solid, const std::string& product);

@@ -12,21 +12,37 @@
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <Interface_EntityIterator.hxx>
 #include <Interface_Static.hxx>
-#include <STEPCAFControl_Controller.hxx>
 #include <STEPCAFControl_Reader.hxx>
-#include <STEPCAFControl_Writer.hxx>
+#include <STEPConstruct.hxx>
+#include <STEPConstruct_DataMapOfAsciiStringTransient.hxx>
+#include <STEPConstruct_DataMapOfPointTransient.hxx>
+#include <STEPConstruct_Styles.hxx>
+#include <STEPControl_Controller.hxx>
+#include <STEPControl_Writer.hxx>
 #include <Standard_Failure.hxx>
+#include <StepBasic_Product.hxx>
 #include <StepData_Protocol.hxx>
 #include <StepData_StepModel.hxx>
 #include <StepData_StepWriter.hxx>
 #include <StepGeom_BSplineCurve.hxx>
 #include <StepGeom_BSplineSurface.hxx>
 #include <StepGeom_CartesianPoint.hxx>
+#include <StepRepr_RepresentationContext.hxx>
+#include <StepRepr_RepresentationItem.hxx>
+#include <StepShape_ShapeRepresentation.hxx>
+#include <StepVisual_Colour.hxx>
+#include <StepVisual_MechanicalDesignGeometricPresentationRepresentation.hxx>
+#include <StepVisual_PresentationStyleAssignment.hxx>
+#include <StepVisual_StyledItem.hxx>
 #include <TCollection_HAsciiString.hxx>
+#include <TopExp_Explorer.hxx>
+#include <Transfer_FinderProcess.hxx>
+#include <XSControl_TransferWriter.hxx>
 #include <XSControl_WorkSession.hxx>
 
 #include "base/atomic_file.h"
 #include "io/exchange.h"
+#include "modeling/solid_shape.h"
 
 namespace angiospline {
 namespace {
@@ -42,7 +58,7 @@ void set_write_options(const StepOptions& options) {
   Interface_Static::SetIVal("write.step.schema", options.schema == StepSchema::kAp214 ? 4 : 5);
   Interface_Static::SetCVal("write.step.unit", "MM");
   Interface_Static::SetCVal("xstep.cascade.unit", "MM");
-  Interface_Static::SetIVal("write.stepcaf.subshapes.name", 1);
+  Interface_Static::SetIVal("write.step.assembly", 0);  // several solids are one product
   Interface_Static::SetCVal("write.step.product.name", options.product.c_str());
   Interface_Static::SetIVal("write.precision.mode", 0);
   Interface_Static::SetIVal("write.surfacecurve.mode", 1);
@@ -122,31 +138,58 @@ Handle(StepData_StepModel) with_shared_points(const Handle(StepData_StepModel) &
   return result;
 }
 
-// The entities of the solid. OpenCASCADE's document, its maps from shapes to entities and the solid
-// itself are not needed any longer when it returns.
+// The product's name, and names and colours of the faces. OpenCASCADE's writer of documents would
+// set them too, after it has listed and checked for every entity which others share it.
+void set_names_and_colours(const STEPControl_Writer& writer, const Solid& solid,
+                           const std::string& product) {
+  const auto model = Handle(StepData_StepModel)::DownCast(writer.WS()->Model());
+  const Handle(Transfer_FinderProcess) made = writer.WS()->TransferWriter()->FinderProcess();
+  STEPConstruct_Styles styles;
+  STEPConstruct_DataMapOfAsciiStringTransient predefined_colours;
+  STEPConstruct_DataMapOfPointTransient colours;
+  std::size_t k = 0;
+  for (TopExp_Explorer at(solid.shape->shape, TopAbs_FACE); at.More(); at.Next(), ++k) {
+    const Handle(StepRepr_RepresentationItem) item = STEPConstruct::FindEntity(made, at.Current());
+    if (item.IsNull()) continue;  // found missing when the file is read back
+    item->SetName(text(solid.faces[k].name));
+    const Handle(StepVisual_Colour) colour = STEPConstruct_Styles::EncodeColor(
+        occt_colour(solid.faces[k].colour), predefined_colours, colours);
+    styles.AddStyle(item, styles.MakeColorPSA(item, colour, nullptr, nullptr, 0.0), nullptr);
+  }
+  Handle(StepRepr_RepresentationContext) context;
+  for (int i = 1; i <= model->NbEntities(); ++i) {
+    const Handle(Standard_Transient)& entity = model->Value(i);
+    if (const auto named = Handle(StepBasic_Product)::DownCast(entity); !named.IsNull()) {
+      named->SetId(text(product));  // OpenCASCADE numbers the products of a process
+      named->SetName(text(product));
+    } else if (const auto shape = Handle(StepShape_ShapeRepresentation)::DownCast(entity);
+               !shape.IsNull()) {
+      context = shape->ContextOfItems();
+    }
+  }
+  Handle(StepVisual_MechanicalDesignGeometricPresentationRepresentation) drawn;
+  if (styles.CreateMDGPR(context, drawn)) model->AddWithRefs(drawn);
+}
+
+// The entities of the solid. OpenCASCADE's maps from shapes to entities and the solid itself are
+// not needed any longer when it returns.
 Result<Handle(StepData_StepModel)> entities_of(const Solid& solid,
                                                const std::filesystem::path& path,
                                                const StepOptions& options,
                                                const Progress& progress) {
-  STEPCAFControl_Controller::Init();
+  STEPControl_Controller::Init();
   set_write_options(
       options);  // before the writer makes its model, which takes the schema from them
-  STEPCAFControl_Writer writer;
-  writer.SetNameMode(true);
-  writer.SetColorMode(true);
-  // What a vessel does not have costs two passes over the model all the same.
-  writer.SetLayerMode(false);
-  writer.SetPropsMode(false);
-  writer.SetSHUOMode(false);
-  writer.SetDimTolMode(false);
-  writer.SetMaterialMode(false);
-  const Handle(TDocStd_Document) document = document_of(solid, options.product);
+  STEPControl_Writer writer;
   const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, "write STEP");
-  const bool done = writer.Transfer(document, STEPControl_AsIs, nullptr, indicator->Start());
-  document->Close();
+  const IFSelect_ReturnStatus done =
+      writer.Transfer(solid.shape->shape, STEPControl_AsIs, false, indicator->Start());
   if (progress.should_stop()) return fail(cancelled("write STEP"));
-  if (!done) return cannot_write(path, "OpenCASCADE could not convert the solid to STEP");
-  const auto model = Handle(StepData_StepModel)::DownCast(writer.ChangeWriter().WS()->Model());
+  if (done != IFSelect_RetDone) {
+    return cannot_write(path, "OpenCASCADE could not convert the solid to STEP");
+  }
+  set_names_and_colours(writer, solid, options.product);
+  const auto model = Handle(StepData_StepModel)::DownCast(writer.WS()->Model());
   set_header(model, options);
   return with_shared_points(model);
 }
