@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "base/contract.h"
+#include "kernel/closest_point.h"
 #include "kernel/refinement.h"
 #include "modeling/overlaps.h"
 
@@ -20,10 +21,17 @@ constexpr int kMoveRounds = 16;
 constexpr int kThinRounds = 12;
 constexpr double kMoveWidth = 4.0;  // radii to either side of a contact
 constexpr double kThinWidth = 3.0;
-constexpr double kHeldRadii = 2.0;   // of a branch at a junction that move with it, as one
-constexpr double kOvershoot = 1.15;  // of a step: what is smoothed over a width falls short
-constexpr double kKnotStep = 1.0;    // radii between knots of a path that moves
-constexpr double kAim = 0.02;        // radii beyond the clearance
+constexpr double kHeldRadii = 2.0;     // of a branch at a junction that move with it, as one
+constexpr double kOvershoot = 1.15;    // of a step: what is smoothed over a width falls short
+constexpr double kKnotStep = 1.0;      // radii between knots of a path that moves
+constexpr double kInsideLimit = 0.75;  // of the largest move, for control points: between them more
+constexpr int kBackRounds = 24;    // of giving way back where a point of the file is too far off
+constexpr double kGiveBack = 0.2;  // of it, in each
+constexpr double kExactLimit = 0.995;  // of the largest move, for the file's points
+constexpr double kGivenBack = 0.96;    // of what smoothing moved, where a vessel moves once more
+constexpr double kHeldFirmly = 0.5;    // by a junction: then the point counts as moving with it
+constexpr int kPasses = 8;             // over the balls in which a junction's points have to stay
+constexpr double kAim = 0.02;          // radii beyond the clearance
 constexpr double kWorthNaming = 1e-3;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -66,6 +74,8 @@ class Separator {
     const OverlapOptions aimed{options_.clearance + kAim};
     for (int round = 0; round < kMoveRounds && !find_contacts(tree_, asked).empty(); ++round) {
       if (!move(find_contacts(tree_, aimed))) break;
+    }
+    for (int round = 0; round < kBackRounds && give_back(); ++round) {
     }
     for (int round = 0; round < kThinRounds && !find_contacts(tree_, asked).empty(); ++round) {
       if (!thin(find_contacts(tree_, aimed))) break;
@@ -129,6 +139,100 @@ class Separator {
     return bump(std::max(0.0, (at_end ? last - along : along) - width) / width);
   }
 
+  // From each control point's place on the path back to where the file had it.
+  void measure_back(std::size_t b) {
+    const BSplineCurve<4>& path = original_[b];
+    const BSplineCurve<3> axis(path.knots(), path.control_points().topRows<3>());
+    const KnotVector& knots = path.knots();
+    back_[b] = Eigen::Matrix3Xd::Zero(3, knots.control_point_count());
+    if (b >= tree_.given.size() || tree_.given[b].cols() < 2) return;
+    const Eigen::Matrix4Xd& given = tree_.given[b];
+    std::vector<double> along{0.0};
+    for (Eigen::Index i = 1; i < given.cols(); ++i) {
+      along.push_back(along.back() + (given.col(i) - given.col(i - 1)).head<3>().norm());
+    }
+    const double last = knots.last();
+    std::vector<double>& places = places_[b];
+    places.clear();
+    for (Eigen::Index i = 0; i < given.cols(); ++i) {
+      const double start = last * along[static_cast<std::size_t>(i)] / along.back();
+      double t = closest_point_from(axis, Vec3(given.col(i).head<3>()), std::min(last, start)).t;
+      if (i == 0) t = 0;
+      if (i + 1 == given.cols()) t = last;
+      places.push_back(places.empty() ? t : std::max(places.back(), t));
+    }
+    std::size_t k = 0;
+    for (int i = 0; i < knots.control_point_count(); ++i) {
+      const double g = knots.greville(i);
+      while (k + 2 < places.size() && places[k + 1] < g) ++k;
+      const double width = places[k + 1] - places[k];
+      const double f = width > 0 ? std::clamp((g - places[k]) / width, 0.0, 1.0) : 0.0;
+      const auto back = [&](std::size_t j) -> Vec3 {
+        return given.col(static_cast<Eigen::Index>(j)).head<3>() - axis.at(places[j]);
+      };
+      back_[b].col(i) = (1 - f) * back(k) + f * back(k + 1);
+    }
+  }
+
+  // Where one of the file's points has come to lie too far away all the same, between control
+  // points, part of the way is given back. False if there is none.
+  bool give_back() {
+    std::vector<char> changed(tree_.paths.size(), 0);
+    std::vector<double> of_nodes(nodes_.size(), 1.0);
+    for (std::size_t b = 0; b < tree_.paths.size(); ++b) {
+      if (places_[b].empty() || tree_.paths[b].control_points().topRows<3>() ==
+                                    original_[b].control_points().topRows<3>()) {
+        continue;
+      }
+      const BSplineCurve<4>& path = tree_.paths[b];
+      const BSplineCurve<3> axis(path.knots(), path.control_points().topRows<3>());
+      for (std::size_t k = 0; k < places_[b].size(); ++k) {
+        const Vec4 point = tree_.given[b].col(static_cast<Eigen::Index>(k));
+        const double most = kExactLimit * options_.largest_move * point(3);
+        const double at = places_[b][k];
+        if (closest_point_from(axis, Vec3(point.head<3>()), at).distance <= most) continue;
+        const int branch = static_cast<int>(b);
+        changed[b] = 1;
+        for_near(branch, at, kHeldRadii * point(3),
+                 [&](Eigen::Index i, double weight) { own_[b].col(i) *= 1 - kGiveBack * weight; });
+        for (const bool at_end : {false, true}) {
+          if (!(hold(branch, at_end, at) > 0)) continue;
+          const int n = node_of(branch, at_end);
+          of_nodes[index(n)] = 1 - kGiveBack;
+          for (const int other : at_[index(n)]) changed[index(other)] = 1;
+        }
+      }
+    }
+    for (std::size_t n = 0; n < nodes_.size(); ++n) nodes_[n] *= of_nodes[n];
+    bool any = false;
+    for (std::size_t b = 0; b < changed.size(); ++b) {
+      if (changed[b] != 0) any = displace(b, {}) || any;
+    }
+    return any;
+  }
+
+  // Into the ball around where the file had it, which reaches at least to where smoothing has it.
+  static void hold_near(Vec3& away, const Vec3& back, double most) {
+    const double reach = std::max(kInsideLimit * most, kGivenBack * back.norm());
+    const Vec3 off = away - back;
+    if (off.norm() > reach) away = back + reach / off.norm() * off;
+  }
+
+  // A junction moves as one piece: so that all that moves with it stays near.
+  void hold_node_near(std::size_t n) {
+    for (int pass = 0; pass < kPasses; ++pass) {
+      for (const int branch : at_[n]) {
+        const auto b = index(branch);
+        const bool at_end = tree_.tree.branches[b].to == static_cast<int>(n);
+        for (Eigen::Index i = 0; i < held_[b].cols(); ++i) {
+          if (held_[b](at_end ? 1 : 0, i) < kHeldFirmly) continue;
+          const double radius = original_[b].control_points()(3, i);
+          hold_near(nodes_[n], back_[b].col(i), options_.largest_move * radius);
+        }
+      }
+    }
+  }
+
   // What of each control point belongs to the junctions at both ends, and its own way so far.
   void prepare(std::size_t b) {
     const KnotVector& knots = tree_.paths[b].knots();
@@ -136,7 +240,10 @@ class Separator {
     if (b >= held_.size()) {
       held_.resize(b + 1);
       own_.resize(b + 1);
+      back_.resize(b + 1);
+      places_.resize(b + 1);
     }
+    measure_back(b);
     own_[b] = Eigen::Matrix3Xd::Zero(3, count);
     held_[b].resize(2, count);
     for (Eigen::Index i = 0; i < count; ++i) {
@@ -221,7 +328,7 @@ class Separator {
       const Vec3 before = nodes_[n];
       nodes_[n] += of_nodes[n].head<3>() / std::max(1.0, of_nodes[n](3));
       const double most = node_limits_mm_[n];
-      if (nodes_[n].norm() > most) nodes_[n] *= most / nodes_[n].norm();
+      hold_node_near(n);
       for (const int b : at_[n]) follows[index(b)] = 1;
       any = any || (nodes_[n] - before).norm() > kWorthNaming * most;
     }
@@ -244,14 +351,16 @@ class Separator {
       if (request.weights.size() > 0 && request.weights(i) > 0) {
         own_[b].col(i) += (1 - at_first) * (1 - at_last) / std::max(1.0, request.weights(i)) *
                           request.moves.col(i);
-        if (own_[b].col(i).norm() > most) own_[b].col(i) *= most / own_[b].col(i).norm();
+        Vec3 own = own_[b].col(i);
+        hold_near(own, back_[b].col(i), most);
+        own_[b].col(i) = own;
       }
       Vec3 away = own_[b].col(i) + at_first * nodes_[index(branch.from)] +
                   at_last * nodes_[index(branch.to)];
       if (branch.from == branch.to)
         away = own_[b].col(i) + std::max(at_first, at_last) * nodes_[index(branch.from)];
       // The junction's own place is no branch's to limit.
-      if (at_first < 1 && at_last < 1 && away.norm() > most) away *= most / away.norm();
+      if (at_first < 1 && at_last < 1) hold_near(away, back_[b].col(i), most);
       const Vec3 before = points.col(i).head<3>();
       points.col(i).head<3>() = home.head<3>() + away;
       largest = std::max(largest, (points.col(i).head<3>() - before).norm() / points(3, i));
@@ -333,8 +442,10 @@ class Separator {
   std::vector<std::vector<int>> at_;  // branches at each node
   std::vector<Vec3> nodes_;           // how far each node has moved
   std::vector<double> node_limits_mm_;
-  std::vector<Eigen::Matrix2Xd> held_;  // of each control point, by the junctions at both ends
-  std::vector<Eigen::Matrix3Xd> own_;   // how far each has moved by itself
+  std::vector<Eigen::Matrix2Xd> held_;       // of each control point, by the junctions at both ends
+  std::vector<std::vector<double>> places_;  // along the path, of the file's points
+  std::vector<Eigen::Matrix3Xd> back_;       // from each to where the file had it
+  std::vector<Eigen::Matrix3Xd> own_;        // how far each has moved by itself
 };
 
 }  // namespace

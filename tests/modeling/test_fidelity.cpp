@@ -118,6 +118,25 @@ TEST(KeepApart, MovesVesselsThatTouchToTheClearanceAndLeavesOthersAlone) {
   EXPECT_EQ(keep_apart(apart).paths[0].control_points(), apart.paths[0].control_points());
 }
 
+// A jagged file has used up most of what vessels may move before they are kept apart; the way back
+// to where the file had them is free.
+TEST(KeepApart, LeavesNoPointFartherThanHalfARadiusFromWhereTheFileHadIt) {
+  const auto jagged = [](double t) { return 0.42 * std::sin(5000 * t); };
+  CenterlineTree tree =
+      tree_of({branch_along("a", 0, 0, [&](double t) { return Vec4(40 * t, 0, jagged(t), 1); }),
+               branch_along("b", 0, 0, [&](double t) {
+                 return Vec4(20, 40 * t - 20, 1.5 + 0.8 * jagged(t), 0.8);
+               })});
+  const SmoothedTree smooth = smooth_centerlines(tree).value();
+  ASSERT_FALSE(find_overlaps(smooth).empty());
+  const SmoothedTree apart = keep_apart(smooth, {0.1});
+  EXPECT_TRUE(find_overlaps(apart, {0.1}).empty());
+  const Fidelity f = measure_fidelity(seed_smoothed(apart)->network, apart);
+  EXPECT_GT(f.largest_move_radii, 0.2);
+  EXPECT_GT(f.largest_clearance_move_radii, 0.1);
+  EXPECT_LT(f.largest_total_move_radii, 0.5);
+}
+
 // Centerlines that nearly meet would have to move by more than half a radius each.
 TEST(KeepApart, ThinsWhatMovingAloneCannotPart) {
   const SmoothedTree before = smooth_centerlines(crossing_tree(0.5)).value();
