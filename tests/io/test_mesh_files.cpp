@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "io/glb_file.h"
+#include "io/model_export.h"
 #include "io/palette.h"
 #include "io/stl_file.h"
 #include "io/text_encoding.h"
@@ -154,6 +155,30 @@ TEST_F(MeshFiles, GlbPassesTheKhronosValidator) {
     EXPECT_EQ(output, "0 0 0 0\n");
   }
   EXPECT_EQ(ran, 4);
+}
+
+TEST_F(MeshFiles, OfVeryLargeModelsAreCoarserByDefaultAndSaidToBe) {
+  const Model model = samples::model_of(samples::bent_tube());
+  const std::vector<fs::path> paths{folder_ / "m.glb", folder_ / "m.stl"};
+  ExportOptions options;
+  const auto usual = export_model(model, paths, options);
+  ASSERT_TRUE(usual) << usual.error().message();
+  EXPECT_TRUE(usual->warnings.empty());
+  const auto bytes = fs::file_size(paths[0]);
+
+  options.tessellation.most_triangles = 400;
+  const auto coarse = export_model(model, paths, options);
+  ASSERT_TRUE(coarse) << coarse.error().message();
+  ASSERT_EQ(coarse->warnings.size(), 1U);  // one mesh, two files
+  EXPECT_NE(coarse->warnings[0].find("instead of 0.01, so that there are at most 400"),
+            std::string::npos)
+      << coarse->warnings[0];
+  EXPECT_LT(fs::file_size(paths[0]), bytes);
+
+  options.tessellation.coarsen = false;
+  const auto refused = export_model(model, paths, options);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().rule.find("with a tolerance of"), std::string::npos);
 }
 
 TEST_F(MeshFiles, NothingIsNotWritten) {
