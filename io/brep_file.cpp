@@ -23,10 +23,6 @@ namespace {
 // kind, radius in mm, red, green, blue, name.
 constexpr const char* kFacesHeading = "Angiospline faces 1";
 
-tl::unexpected<Error> cannot_write(const std::filesystem::path& path, std::string what) {
-  return fail({ErrorKind::kCannotWrite, std::move(what), path.string(), {}, {}});
-}
-
 Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& path,
                              const Progress& progress) {
   try {
@@ -96,19 +92,12 @@ std::optional<std::string> find_missing_table(const std::string& text) {
 }  // namespace
 
 Result<void> write_brep(Solid solid, const std::filesystem::path& path, const Progress& progress) {
-  const SolidDigest digest = digest_of(solid);
-  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(std::exchange(solid, {}), temporary, progress); !done) {
-      if (done.error().kind == ErrorKind::kCancelled) return done;
-      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
-    }
-    const Result<Solid> read = read_brep(temporary, progress);
-    if (!read) {
-      if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
-      return cannot_write(path, "cannot be read back: " + read.error().what);
-    }
-    return expect_same(digest, *read, path);
-  });
+  return write_verified(
+      std::move(solid), path,
+      [&](Solid given, const std::filesystem::path& temporary) {
+        return write_unchecked(std::move(given), temporary, progress);
+      },
+      [&](const std::filesystem::path& temporary) { return read_brep(temporary, progress); });
 }
 
 Result<Solid> read_brep(const std::filesystem::path& path, const Progress& progress) {

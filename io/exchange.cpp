@@ -6,6 +6,7 @@
 #include <optional>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
 #include <BRepBndLib.hxx>
 #include <BRep_Builder.hxx>
@@ -34,6 +35,7 @@
 #include <XCAFDoc_ShapeTool.hxx>
 #include <XSAlgo.hxx>
 
+#include "base/atomic_file.h"
 #include "modeling/solid_shape.h"
 
 namespace angiospline {
@@ -268,6 +270,29 @@ SolidDigest digest_of(const Solid& solid) {
                             samples_of(*BRep_Tool::Surface(TopoDS::Face(at.Current())))});
   }
   return digest;
+}
+
+tl::unexpected<Error> cannot_write(const std::filesystem::path& path, std::string what) {
+  return fail({ErrorKind::kCannotWrite, std::move(what), path.string(), {}, {}});
+}
+
+Result<void> write_verified(
+    Solid solid, const std::filesystem::path& path,
+    const std::function<Result<void>(Solid, const std::filesystem::path&)>& write,
+    const std::function<Result<Solid>(const std::filesystem::path&)>& read) {
+  const SolidDigest digest = digest_of(solid);
+  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
+    if (auto done = write(std::exchange(solid, {}), temporary); !done) {
+      if (done.error().kind == ErrorKind::kCancelled) return done;
+      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
+    }
+    const Result<Solid> back = read(temporary);
+    if (!back) {
+      if (back.error().kind == ErrorKind::kCancelled) return fail(back.error());
+      return cannot_write(path, "cannot be read back: " + back.error().what);
+    }
+    return expect_same(digest, *back, path);
+  });
 }
 
 Result<void> expect_same(const SolidDigest& written, const Solid& read,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -66,6 +67,16 @@ SolidDigest digest_of(const Solid& solid);
 // orientations, surfaces at 49 points each within 1e-9 of the model's size; otherwise what differs.
 Result<void> expect_same(const SolidDigest& written, const Solid& read,
                          const std::filesystem::path& path);
+
+tl::unexpected<Error> cannot_write(const std::filesystem::path& path, std::string what);
+
+// Writes a solid into a temporary file beside `path`, lets it go, reads the file back and compares;
+// only then the file has its name. Errors: those of `write` and `read`, what differs, all of them
+// naming `path`; stopped on request.
+Result<void> write_verified(
+    Solid solid, const std::filesystem::path& path,
+    const std::function<Result<void>(Solid, const std::filesystem::path&)>& write,
+    const std::function<Result<Solid>(const std::filesystem::path&)>& read);
 
 // What is done to shapes that are read. Our own files are compared as they are.
 enum class Healing { kAsReadersDo, kNone };

@@ -17,7 +17,6 @@
 #include <TransferBRep_ShapeMapper.hxx>
 #include <Transfer_FinderProcess.hxx>
 
-#include "base/atomic_file.h"
 #include "io/exchange.h"
 #include "modeling/solid_shape.h"
 
@@ -26,10 +25,6 @@ namespace {
 
 // Repeatable bytes: the model's day is not news to its reader.
 constexpr const char* kTimeStamp = "20000101.000000";
-
-tl::unexpected<Error> cannot_write(const std::filesystem::path& path, std::string what) {
-  return fail({ErrorKind::kCannotWrite, std::move(what), path.string(), {}, {}});
-}
 
 Handle(TCollection_HAsciiString) text(const std::string& value) {
   return new TCollection_HAsciiString(value.c_str());
@@ -133,20 +128,14 @@ Result<Solid> read_iges(const std::filesystem::path& path, Healing healing,
 
 Result<void> write_iges(Solid solid, const std::filesystem::path& path, const IgesOptions& options,
                         const Progress& progress) {
-  const SolidDigest digest = digest_of(solid);
-  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(std::exchange(solid, {}), temporary, options, progress);
-        !done) {
-      if (done.error().kind == ErrorKind::kCancelled) return done;
-      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
-    }
-    const Result<Solid> read = read_iges(temporary, Healing::kNone, progress);
-    if (!read) {
-      if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
-      return cannot_write(path, "cannot be read back: " + read.error().what);
-    }
-    return expect_same(digest, *read, path);
-  });
+  return write_verified(
+      std::move(solid), path,
+      [&](Solid given, const std::filesystem::path& temporary) {
+        return write_unchecked(std::move(given), temporary, options, progress);
+      },
+      [&](const std::filesystem::path& temporary) {
+        return read_iges(temporary, Healing::kNone, progress);
+      });
 }
 
 Result<Solid> read_iges(const std::filesystem::path& path, const Progress& progress) {

@@ -40,7 +40,6 @@
 #include <XSControl_TransferWriter.hxx>
 #include <XSControl_WorkSession.hxx>
 
-#include "base/atomic_file.h"
 #include "io/exchange.h"
 #include "modeling/solid_shape.h"
 
@@ -74,10 +73,6 @@ void set_header(const Handle(StepData_StepModel) & model, const StepOptions& opt
   header.SetOriginatingSystem(text("Angiospline"));
   header.SetAuthorisation(text(""));
   header.SetDescriptionValue(1, text("vessel model, lengths in millimetres"));
-}
-
-tl::unexpected<Error> cannot_write(const std::filesystem::path& path, std::string what) {
-  return fail({ErrorKind::kCannotWrite, std::move(what), path.string(), {}, {}});
 }
 
 // Points by the bits of their coordinates, so that each is written once.
@@ -250,20 +245,14 @@ Result<Solid> read_step(const std::filesystem::path& path, Healing healing,
 
 Result<void> write_step(Solid solid, const std::filesystem::path& path, const StepOptions& options,
                         const Progress& progress) {
-  const SolidDigest digest = digest_of(solid);
-  return write_atomically(path, [&](const std::filesystem::path& temporary) -> Result<void> {
-    if (auto done = write_unchecked(std::exchange(solid, {}), temporary, options, progress);
-        !done) {
-      if (done.error().kind == ErrorKind::kCancelled) return done;
-      return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
-    }
-    const Result<Solid> read = read_step(temporary, Healing::kNone, progress);
-    if (!read) {
-      if (read.error().kind == ErrorKind::kCancelled) return fail(read.error());
-      return cannot_write(path, "cannot be read back: " + read.error().what);
-    }
-    return expect_same(digest, *read, path);
-  });
+  return write_verified(
+      std::move(solid), path,
+      [&](Solid given, const std::filesystem::path& temporary) {
+        return write_unchecked(std::move(given), temporary, options, progress);
+      },
+      [&](const std::filesystem::path& temporary) {
+        return read_step(temporary, Healing::kNone, progress);
+      });
 }
 
 Result<Solid> read_step(const std::filesystem::path& path, const Progress& progress) {
