@@ -166,9 +166,9 @@ TEST_F(CadFiles, ByOthersWithoutNamesAreNumberedAndTheirEndsAreCaps) {
   EXPECT_EQ(c.smooth_edges, 1);  // the seam
   EXPECT_LT(c.max_normal_angle_deg, 1e-9);
   BRepTools::Write(BRepPrimAPI_MakeBox(1, 2, 3).Shape(), path.c_str());
-  for (const SolidFace& face : read_brep(path).value().faces) {
-    EXPECT_EQ(face.kind, FaceKind::kWall);
-  }
+  const Solid box = read_brep(path).value();
+  ASSERT_EQ(box.faces.size(), 6U);
+  for (const SolidFace& face : box.faces) EXPECT_EQ(face.kind, FaceKind::kWall);
 }
 
 TEST_F(CadFiles, InOtherUnitsAreReadInMillimetres) {
