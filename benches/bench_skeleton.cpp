@@ -19,6 +19,7 @@
 #include "recovery/morphology.h"
 #include "recovery/vessels_from_mask.h"
 #include "tests/recovery/random_trees.h"
+#include "tests/recovery/tree_match.h"
 
 namespace angiospline {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "base/contract.h"
 #include "kernel/closest_point.h"
-#include "kernel/refinement.h"
 #include "modeling/overlaps.h"
+#include "modeling/path_knots.h"
 
 namespace angiospline {
 namespace {
@@ -23,7 +23,6 @@ constexpr double kMoveWidth = 4.0;  // radii to either side of a contact
 constexpr double kThinWidth = 3.0;
 constexpr double kHeldRadii = 2.0;     // of a branch at a junction that move with it, as one
 constexpr double kOvershoot = 1.15;    // of a step: what is smoothed over a width falls short
-constexpr double kKnotStep = 1.0;      // radii between knots of a path that moves
 constexpr double kInsideLimit = 0.75;  // of the largest move, for control points: between them more
 constexpr int kBackRounds = 24;    // of giving way back where a point of the file is too far off
 constexpr double kGiveBack = 0.2;  // of it, in each
@@ -108,18 +107,9 @@ class Separator {
     }
     for (std::size_t b = 0; b < touched.size(); ++b) {
       if (touched[b] == 0) continue;
-      const BSplineCurve<4>& path = tree_.paths[b];
-      const double step = kKnotStep * path.control_points().row(3).mean();
-      std::vector<double> added;
-      const std::vector<double> breaks = path.knots().breakpoints();
-      for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
-        const int pieces = static_cast<int>(std::ceil((breaks[k + 1] - breaks[k]) / step));
-        for (int i = 1; i < pieces; ++i) {
-          added.push_back(breaks[k] + (breaks[k + 1] - breaks[k]) * i / pieces);
-        }
-      }
-      if (added.empty()) continue;
-      tree_.paths[b] = insert_knots(path, added).value();
+      BSplineCurve<4> path = with_knots_each_radius(tree_.paths[b]);
+      if (path.knots() == tree_.paths[b].knots()) continue;
+      tree_.paths[b] = std::move(path);
       original_[b] = tree_.paths[b];
       prepare(b);
     }

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "kernel/refinement.h"
+#include "modeling/path_knots.h"
 
 namespace angiospline {
 namespace {
@@ -19,7 +19,6 @@ constexpr double kFullRadii = 2.0;   // along the tree from a node on, thinned b
 constexpr double kFadeRadii = 3.0;   // and from there on less and less
 constexpr double kMostAtOnce = 0.8;  // what one cut leaves at least: it changes the whole plan
 constexpr double kSpare = 0.97;      // of the length that is lacking
-constexpr double kKnotStep = 1.0;    // radii between knots of a path that is thinned
 constexpr double kWorthNaming = 1e-3;
 constexpr int kPlacesPerRadius = 2;  // at which the way along a branch is measured
 
@@ -58,20 +57,6 @@ class Parts {
   std::vector<int> of_;
   std::vector<std::size_t> branches_;
 };
-
-// A straight path may have a handful of control points: its radius needs some to every radius.
-BSplineCurve<4> with_knots(const BSplineCurve<4>& path) {
-  const double step = kKnotStep * path.control_points().row(3).mean();
-  std::vector<double> added;
-  const std::vector<double> breaks = path.knots().breakpoints();
-  for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
-    const int pieces = static_cast<int>(std::ceil((breaks[k + 1] - breaks[k]) / step));
-    for (int i = 1; i < pieces; ++i) {
-      added.push_back(breaks[k] + (breaks[k + 1] - breaks[k]) * i / pieces);
-    }
-  }
-  return added.empty() ? path : insert_knots(path, added).value();
-}
 
 }  // namespace
 
@@ -159,7 +144,7 @@ double RoomMaker::share_at(std::size_t b, double along) const {
 }
 
 void RoomMaker::thin(std::size_t b, SmoothedTree& tree) const {
-  const BSplineCurve<4> fine = with_knots(given_.paths[b]);
+  const BSplineCurve<4> fine = with_knots_each_radius(given_.paths[b]);
   Eigen::Matrix4Xd points = fine.control_points();
   double kept = 1;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {

@@ -99,7 +99,8 @@ class Refit {
         large_residuals(field_, network_, part.mesh, smoother,
                         first ? levels_.greys : levels_.on(part.mesh), excluded_);
     leave_out_stuck(part.mesh, large);
-    if (!large.any() || progress_.should_stop()) return false;
+    if (progress_.should_stop()) return fail(cancelled("refinement"));
+    if (!large.any()) return false;
     const Eigen::VectorXd share = share_of(part.mesh, large.large, smoother);
     const RefinedNetwork finer = refined_where_large(network_, part.mesh, large, share,
                                                      kShortestSpanVox * field_.voxel_mm());

@@ -3,6 +3,7 @@
 
 #include "recovery/vessels_from_mask.h"
 #include "tests/recovery/random_trees.h"
+#include "tests/recovery/tree_match.h"
 
 namespace angiospline {
 namespace {
