@@ -8,10 +8,10 @@
 #include <benchmark/benchmark.h>
 
 #include "base/random.h"
-#include "io/centerline_file.h"
-#include "modeling/overlaps.h"
-#include "modeling/point_graph.h"
-#include "modeling/smooth_centerlines.h"
+#include "io/centerlines/centerline_file.h"
+#include "modeling/tree/overlaps.h"
+#include "modeling/tree/point_graph.h"
+#include "modeling/tree/smooth_centerlines.h"
 
 namespace angiospline {
 namespace {

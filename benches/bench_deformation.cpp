@@ -14,16 +14,16 @@
 #include <utility>
 #include <vector>
 
-#include "benches/fit_phantoms.h"
 #include <Eigen/SVD>
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "modeling/seed_model.h"
-#include "modeling/tessellation.h"
-#include "recovery/deform_model.h"
-#include "recovery/deform_solver.h"
-#include "recovery/phantom.h"
+#include "benches/fit_phantoms.h"
+#include "modeling/build/build_model.h"
+#include "modeling/network/tessellation.h"
+#include "recovery/phantoms/phantom.h"
+#include "recovery/thesis/deform/deform_model.h"
+#include "recovery/thesis/deform/solver.h"
 
 namespace {
 
@@ -46,7 +46,7 @@ auto timed(double& seconds, Work&& work) {
 
 void bifurcation() {
   const auto phantom = make_phantom(PhantomKind::kBifurcation);
-  const auto model = seed_model(phantom->tree);
+  const auto model = build_model(phantom->tree);
   NetworkMeshOptions fineness;
   fineness.least_pieces = 2;
   DeformMesh mesh = control_mesh(refine_network(model->network, fineness)->network);
@@ -168,7 +168,7 @@ void whole_models() {
         b.points_mm.colwise() += shift;
         b.radii_mm *= 1 + 0.1 * off;
       }
-      const auto model = seed_model(tree);
+      const auto model = build_model(tree);
       if (!model) continue;
       const auto result = deform_model(*model, image);
       if (!result) {

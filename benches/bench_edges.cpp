@@ -14,11 +14,11 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "recovery/edge_detection.h"
-#include "recovery/edge_localisation.h"
-#include "recovery/edge_masks.h"
-#include "recovery/phantom.h"
-#include "recovery/rasterize.h"
+#include "recovery/imaging/rasterize/shapes.h"
+#include "recovery/phantoms/phantom.h"
+#include "recovery/thesis/edges/edge_detection.h"
+#include "recovery/thesis/edges/edge_localisation.h"
+#include "recovery/thesis/edges/edge_masks.h"
 
 namespace {
 

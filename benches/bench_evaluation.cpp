@@ -4,15 +4,15 @@
 #include <ctime>
 #include <vector>
 
-#include "benches/kernel_samples.h"
-#include "benches/sisl_peer.h"
 #include <GeomAdaptor_Surface.hxx>
 #include <benchmark/benchmark.h>
 #include <gp_Vec.hxx>
 
-#include "kernel/evaluator.h"
-#include "kernel/grid.h"
-#include "modeling/occt_bspline.h"
+#include "benches/kernel_samples.h"
+#include "benches/sisl_peer.h"
+#include "kernel/evaluate/grid.h"
+#include "kernel/spline/evaluator.h"
+#include "modeling/solid/occt_bspline.h"
 
 namespace angiospline::bench {
 namespace {

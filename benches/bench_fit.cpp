@@ -15,18 +15,18 @@
 #include <string>
 #include <vector>
 
-#include "benches/fit_phantoms.h"
 #include <fmt/format.h>
 
-#include "modeling/certificate.h"
-#include "modeling/seed_model.h"
-#include "modeling/tessellation.h"
-#include "recovery/closed_surface.h"
-#include "recovery/fit_model.h"
-#include "recovery/gaussian.h"
-#include "recovery/morphology.h"
-#include "recovery/segmentation.h"
-#include "recovery/vessels_from_mask.h"
+#include "benches/fit_phantoms.h"
+#include "modeling/build/build_model.h"
+#include "modeling/check/certificate.h"
+#include "modeling/network/tessellation.h"
+#include "recovery/centerlines/vessels_from_mask.h"
+#include "recovery/fit/closed_surface.h"
+#include "recovery/fit/fit_model.h"
+#include "recovery/imaging/image/gaussian.h"
+#include "recovery/imaging/mask/morphology.h"
+#include "recovery/imaging/segment/segment.h"
 
 namespace angiospline {
 namespace {
@@ -60,7 +60,7 @@ Mask rough_mask(const Image<float>& image) {
 }
 
 Result<Model> start_of(const FitPhantom& phantom, const Image<float>& image) {
-  if (!phantom.tree.branches.empty()) return seed_model(phantom.tree);
+  if (!phantom.tree.branches.empty()) return build_model(phantom.tree);
   return closed_model(largest_component(rough_mask(image)));  // the others are noise
 }
 
@@ -249,7 +249,7 @@ void starts(const std::vector<std::string>& only) {
         for (const Vec3& way : {Vec3(1, 0, 0), Vec3(-0.6, 0.8, 0), Vec3(0, -1, 0)}) {
           if (size == 0 && way.x() != 1) continue;
           for (const double factor : {0.5, 1.0, 1.5}) {
-            const auto start = seed_model(displaced(phantom.tree, size * way, factor));
+            const auto start = build_model(displaced(phantom.tree, size * way, factor));
             const auto o =
                 start ? outcome(phantom, *start, image) : Result<Outcome>(fail(start.error()));
             const std::string what =
@@ -294,7 +294,7 @@ void own() {
         continue;
       }
       const auto vessels = vessels_from_mask(segmented->mask);
-      const auto start = vessels ? seed_model(vessels->tree) : Result<Model>(fail(vessels.error()));
+      const auto start = vessels ? build_model(vessels->tree) : Result<Model>(fail(vessels.error()));
       if (!start) {
         std::printf("%s\n", start.error().message().c_str());
         continue;

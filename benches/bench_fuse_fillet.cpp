@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <ctime>
 
-#include "junction_classes.h"
 #include <BRepAdaptor_Surface.hxx>
 #include <BRepAlgoAPI_Fuse.hxx>
 #include <BRepCheck_Analyzer.hxx>
@@ -27,7 +26,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "modeling/junction.h"
+#include "benches/junction_classes.h"
+#include "modeling/junction/junction.h"
 
 namespace {
 

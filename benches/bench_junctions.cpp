@@ -10,13 +10,13 @@
 #include <numbers>
 #include <string>
 
-#include "junction_classes.h"
 #include <fmt/core.h>
 
-#include "modeling/junction.h"
-#include "modeling/junction_layout.h"
-#include "modeling/plan_openings.h"
-#include "modeling/smooth_junction.h"
+#include "benches/junction_classes.h"
+#include "modeling/junction/junction.h"
+#include "modeling/junction/layout.h"
+#include "modeling/junction/plan_openings.h"
+#include "modeling/junction/smooth_junction.h"
 
 namespace {
 

@@ -1,11 +1,11 @@
 #include <cmath>
 
-#include "benches/kernel_samples.h"
-#include "benches/sisl_peer.h"
 #include <benchmark/benchmark.h>
 
-#include "kernel/periodic.h"
-#include "kernel/reduce.h"
+#include "benches/kernel_samples.h"
+#include "benches/sisl_peer.h"
+#include "kernel/reduce/reduce.h"
+#include "kernel/refine/periodic.h"
 
 namespace angiospline::bench {
 namespace {

@@ -1,17 +1,17 @@
 #include <cmath>
 #include <vector>
 
-#include "benches/kernel_samples.h"
-#include "benches/sisl_peer.h"
 #include <TColStd_Array1OfInteger.hxx>
 #include <TColStd_Array1OfReal.hxx>
 #include <benchmark/benchmark.h>
 
-#include "kernel/control_mesh.h"
-#include "kernel/fit.h"
-#include "kernel/grid.h"
-#include "kernel/refinement.h"
-#include "modeling/occt_bspline.h"
+#include "benches/kernel_samples.h"
+#include "benches/sisl_peer.h"
+#include "kernel/evaluate/grid.h"
+#include "kernel/fit/fit.h"
+#include "kernel/refine/control_mesh.h"
+#include "kernel/refine/refinement.h"
+#include "modeling/solid/occt_bspline.h"
 
 namespace angiospline::bench {
 namespace {

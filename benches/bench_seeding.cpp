@@ -12,18 +12,18 @@
 #include <string>
 #include <vector>
 
-#include "tree_families.h"
 #include <fmt/core.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "io/centerline_export.h"
-#include "io/centerline_file.h"
-#include "io/model_export.h"
-#include "modeling/certificate.h"
-#include "modeling/fidelity.h"
-#include "modeling/seed_model.h"
+#include "benches/tree_families.h"
+#include "io/centerlines/centerline_export.h"
+#include "io/centerlines/centerline_file.h"
+#include "io/export/export_model.h"
+#include "modeling/build/build_model.h"
+#include "modeling/check/certificate.h"
+#include "modeling/check/fidelity.h"
 
 namespace {
 
@@ -84,7 +84,7 @@ int run_size(int branches, const std::vector<std::string>& suffixes) {
   const auto smoothed = smooth_centerlines(*tree);
   if (!smoothed) return complain(smoothed.error());
   row += fmt::format(" {:.3f} |", clock.lap());
-  auto seeded = seed_with_room(*smoothed);
+  auto seeded = build_with_room(*smoothed);
   if (!seeded) return complain(seeded.error());
   Model* const model = &seeded->model;
   model->name = "comb";
@@ -156,7 +156,7 @@ void judge(const CenterlineTree& tree, int number, Tally& tally) {
     tally.remarks += fmt::format("  [{}] {}\n", number, text);
   };
   const auto smoothed = smooth_centerlines(tree);
-  const auto seeded = smoothed ? seed_with_room(*smoothed) : Result<Seeded>(fail(smoothed.error()));
+  const auto seeded = smoothed ? build_with_room(*smoothed) : Result<BuiltModel>(fail(smoothed.error()));
   if (!seeded) {
     ++tally.refused;
     remark(seeded.error().message());

@@ -20,13 +20,13 @@
 #include <itkMultiThreaderBase.h>
 #include <tbb/global_control.h>
 
-#include "recovery/metrics.h"
-#include "recovery/phantom.h"
-#include "recovery/segmentation.h"
-#include "recovery/thinning.h"
-#include "recovery/topology_numbers.h"
-#include "recovery/vessels_from_mask.h"
-#include "tests/recovery/random_trees.h"
+#include "recovery/analysis/compare_masks.h"
+#include "recovery/centerlines/vessels_from_mask.h"
+#include "recovery/imaging/mask/topology_numbers.h"
+#include "recovery/imaging/segment/segment.h"
+#include "recovery/imaging/skeleton/thinning.h"
+#include "recovery/phantoms/phantom.h"
+#include "tests/shapes/random_trees.h"
 
 namespace {
 

@@ -15,11 +15,11 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "recovery/gaussian.h"
-#include "recovery/morphology.h"
-#include "recovery/vessels_from_mask.h"
-#include "tests/recovery/random_trees.h"
-#include "tests/recovery/tree_match.h"
+#include "recovery/centerlines/vessels_from_mask.h"
+#include "recovery/imaging/image/gaussian.h"
+#include "recovery/imaging/mask/morphology.h"
+#include "tests/shapes/random_trees.h"
+#include "tests/shapes/tree_match.h"
 
 namespace angiospline {
 namespace {

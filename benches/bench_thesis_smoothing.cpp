@@ -6,7 +6,7 @@
 
 #include <fmt/core.h>
 
-#include "modeling/thesis_smoothing.h"
+#include "recovery/thesis/smoothing/thesis_smoothing.h"
 
 int main(int argc, char** argv) {
   using namespace angiospline;

@@ -10,8 +10,8 @@
 #include <sys/resource.h>
 
 #include "base/random.h"
-#include "modeling/certificate.h"
-#include "modeling/seed_model.h"
+#include "modeling/build/build_model.h"
+#include "modeling/check/certificate.h"
 
 namespace {
 
@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   Random random(argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
   const CenterlineTree tree = random_tree(bifurcations, random);
   const auto start = std::chrono::steady_clock::now();
-  const auto model = seed_model(tree);
+  const auto model = build_model(tree);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!model) {

@@ -15,9 +15,9 @@
 #include <itkMultiThreaderBase.h>
 #include <tbb/global_control.h>
 
-#include "io/image_file.h"
-#include "recovery/seed_search.h"
-#include "recovery/vesselness.h"
+#include "io/images/image_file.h"
+#include "recovery/imaging/segment/seed_search.h"
+#include "recovery/imaging/segment/vesselness.h"
 
 namespace {
 

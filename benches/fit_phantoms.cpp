@@ -15,17 +15,16 @@
 #include <vtkPolyData.h>
 #include <vtkPolyDataConnectivityFilter.h>
 
+#include "base/index.h"
 #include "base/random.h"
-#include "recovery/gaussian.h"
-#include "recovery/rasterize.h"
-#include "recovery/voxelize.h"
+#include "recovery/imaging/image/gaussian.h"
+#include "recovery/imaging/rasterize/shapes.h"
+#include "recovery/imaging/rasterize/voxelize.h"
 
 namespace angiospline {
 namespace {
 
 constexpr double kMargin = 2.0;  // voxels from an open end
-
-std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
 double distance_to_tree(const CenterlineTree& tree, const Vec3& p) {
   double least = 1e300;
@@ -62,7 +61,7 @@ void find_ends(FitPhantom& phantom) {
   const auto at_node = branches_at_nodes(phantom.tree);
   for (std::size_t n = 0; n < at_node.size(); ++n) {
     if (at_node[n].size() != 1) continue;
-    const CenterlineBranch& b = phantom.tree.branches[at(at_node[n].front())];
+    const CenterlineBranch& b = phantom.tree.branches[index(at_node[n].front())];
     const Eigen::Index last = b.points_mm.cols() - 1;
     const bool start = b.from == static_cast<int>(n);
     const Vec3 end = b.points_mm.col(start ? 0 : last);
@@ -243,14 +242,14 @@ Image<float> with_ramp(const FitPhantom& phantom, double snr, std::uint64_t seed
 
 Accuracy accuracy(const FitPhantom& phantom, const TriangleMesh& mesh, const std::vector<Rim>& rims,
                   const std::function<bool(const Vec3&)>& where) {
-  std::vector<double> distance(at(mesh.points_mm.cols()));
+  std::vector<double> distance(index(mesh.points_mm.cols()));
   for (std::size_t i = 0; i < distance.size(); ++i) {
     distance[i] = phantom.distance(mesh.points_mm.col(static_cast<Eigen::Index>(i)));
   }
   std::vector<std::pair<double, double>> all;
   double area = 0, sum = 0, bias = 0;
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-    if (!is_wall(mesh.parts[at(mesh.part_of[at(t)])].kind)) continue;
+    if (!is_wall(mesh.parts[index(mesh.part_of[index(t)])].kind)) continue;
     const Eigen::Vector3i c = mesh.triangles.col(t);
     const Vec3 a = mesh.points_mm.col(c(0)), b = mesh.points_mm.col(c(1)),
                d = mesh.points_mm.col(c(2));
@@ -260,8 +259,8 @@ Accuracy accuracy(const FitPhantom& phantom, const TriangleMesh& mesh, const std
     const double weight = (b - a).cross(d - a).norm() / 2;
     double size = 0, offset = 0;
     for (const int p : c) {
-      size += std::abs(distance[at(p)]) / 3;
-      offset += distance[at(p)] / 3;
+      size += std::abs(distance[index(p)]) / 3;
+      offset += distance[index(p)] / 3;
     }
     all.emplace_back(size, weight);
     sum += weight * size;
@@ -327,7 +326,7 @@ MarchingCubes marching_cubes(const FitPhantom& phantom, const Image<float>& imag
       found->GetPoint(p, mesh.points_mm.col(p).data());
     }
     mesh.triangles.resize(3, found->GetNumberOfCells());
-    mesh.part_of.assign(at(found->GetNumberOfCells()), 0);
+    mesh.part_of.assign(index(found->GetNumberOfCells()), 0);
     for (vtkIdType t = 0; t < found->GetNumberOfCells(); ++t) {
       vtkIdType count = 0;
       const vtkIdType* ids = nullptr;
@@ -336,8 +335,8 @@ MarchingCubes marching_cubes(const FitPhantom& phantom, const Image<float>& imag
     }
     const Accuracy now = accuracy(phantom, mesh);
     if (!(now.mean_vox < best.accuracy.mean_vox)) continue;
-    std::vector<char> used(at(mesh.points_mm.cols()), 0);
-    for (Eigen::Index i = 0; i < mesh.triangles.size(); ++i) used[at(mesh.triangles.data()[i])] = 1;
+    std::vector<char> used(index(mesh.points_mm.cols()), 0);
+    for (Eigen::Index i = 0; i < mesh.triangles.size(); ++i) used[index(mesh.triangles.data()[i])] = 1;
     best = {now, share, std::count(used.begin(), used.end(), 1),
             static_cast<long>(mesh.triangles.cols())};
   }

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "modeling/centerline_tree.h"
-#include "modeling/surface_network.h"
-#include "modeling/triangle_mesh.h"
-#include "recovery/image.h"
-#include "recovery/phantom.h"
+#include "kernel/geometry/triangle_mesh.h"
+#include "modeling/network/surface_network.h"
+#include "modeling/tree/centerline_tree.h"
+#include "recovery/imaging/image/image.h"
+#include "recovery/phantoms/phantom.h"
 
 namespace angiospline {
 
@@ -36,7 +36,8 @@ LocalPhantom local_phantom(LocalKind kind);
 
 inline constexpr double kBackground = 200, kContrast = 1000;
 
-// The phantoms of recovery/phantom.h; spacing in mm. The tree has 21 branches in 144 mm, seed 3.
+// The phantoms of recovery/phantoms/phantom.h; spacing in mm. The tree has 21 branches in 144 mm,
+// seed 3.
 FitPhantom fit_phantom(PhantomKind kind, const Vec3& spacing_mm = Vec3::Ones());
 
 // The bent tube with another of its kind beside it, wall to wall one diameter apart. Only the first

@@ -1,4 +1,4 @@
-#include "junction_classes.h"
+#include "benches/junction_classes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "modeling/junction.h"
+#include "modeling/junction/junction.h"
 
 namespace angiospline {
 

@@ -8,9 +8,9 @@
 #include <Eigen/Geometry>
 
 #include "base/random.h"
-#include "kernel/fit.h"
-#include "kernel/grid.h"
-#include "kernel/periodic.h"
+#include "kernel/evaluate/grid.h"
+#include "kernel/fit/fit.h"
+#include "kernel/refine/periodic.h"
 
 namespace angiospline::bench {
 namespace {

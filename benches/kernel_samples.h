@@ -6,8 +6,8 @@
 
 #include <Eigen/Core>
 
-#include "kernel/curve.h"
-#include "kernel/surface.h"
+#include "kernel/spline/curve.h"
+#include "kernel/spline/surface.h"
 
 namespace angiospline::bench {
 

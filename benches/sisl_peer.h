@@ -5,8 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "benches/kernel_samples.h"
 #include <sisl.h>
+
+#include "benches/kernel_samples.h"
 
 namespace angiospline::bench {
 

@@ -1,4 +1,4 @@
-#include "tree_families.h"
+#include "benches/tree_families.h"
 
 #include <cmath>
 #include <functional>
@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/contract.h"
-#include "modeling/point_graph.h"
+#include "modeling/tree/point_graph.h"
 
 namespace angiospline {
 namespace {

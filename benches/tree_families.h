@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "modeling/centerline_tree.h"
+#include "modeling/tree/centerline_tree.h"
 
 namespace angiospline {
 

@@ -82,7 +82,7 @@ Json graph_json(const CenterlineTree& tree) {
 
 Json contacts_json(const Vessels& vessels) {
   Json contacts = Json::array();
-  for (const VesselContact& contact : vessels.contacts)
+  for (const MaskContact& contact : vessels.contacts)
     contacts.push_back({{"kind", name_of(contact.kind)},
                         {"position_mm", to_json(contact.at_mm)},
                         {"radii_mm", {contact.a.radius_mm, contact.b.radius_mm}},

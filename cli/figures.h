@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/stages.h"
-#include "modeling/fidelity.h"
-#include "modeling/model.h"
+#include "modeling/check/fidelity.h"
+#include "modeling/network/model.h"
 
 namespace angiospline::cli {
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "modeling/solid.h"
+#include "modeling/solid/solid.h"
 
 namespace angiospline::cli {
 

@@ -9,10 +9,10 @@
 #include "cli/commands.h"
 #include "cli/console.h"
 #include "cli/stages.h"
-#include "io/centerline_file.h"
-#include "io/model_export.h"
-#include "modeling/certificate.h"
-#include "modeling/seed_model.h"
+#include "io/centerlines/centerline_file.h"
+#include "io/export/export_model.h"
+#include "modeling/build/build_model.h"
+#include "modeling/check/certificate.h"
 
 namespace angiospline::cli {
 

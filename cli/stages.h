@@ -9,9 +9,9 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "cli/commands.h"
-#include "io/image_file.h"
-#include "recovery/segmentation.h"
-#include "recovery/vessels_from_mask.h"
+#include "io/images/image_file.h"
+#include "recovery/centerlines/vessels_from_mask.h"
+#include "recovery/imaging/segment/segment.h"
 
 namespace angiospline::cli {
 

@@ -21,7 +21,7 @@ if(NOT TARGET Angiospline::OpenCASCADE)
     TKTopAlgo TKPrim TKBool TKBO TKFillet TKGeomAlgo TKBRep TKGeomBase TKG3d TKG2d TKMath TKernel)
 endif()
 
-# Only the readers and writers that io/image_file_itk.cpp names: no filters, no factories.
+# Only the readers and writers that io/images/image_file_itk.cpp names: no filters, no factories.
 # Debian packages GDCM's programs apart; ITK's notes on them are of no use here.
 set(_angiospline_log_level ${CMAKE_MESSAGE_LOG_LEVEL})
 set(CMAKE_MESSAGE_LOG_LEVEL WARNING)

@@ -61,9 +61,11 @@ std::vector<std::string> TemporaryFolder::files() const {
   return names;
 }
 
+std::string program_path() { return ANGIOSPLINE_PROGRAM; }
+
 ProgramRun run_angiospline(const std::vector<std::string>& arguments) {
   const TemporaryFolder talk;
-  std::string command = quoted(ANGIOSPLINE_PROGRAM);
+  std::string command = quoted(program_path());
   for (const std::string& argument : arguments) command.append(" ").append(quoted(argument));
   command.append(" >").append(quoted(talk / "out"));
   command.append(" 2>").append(quoted(talk / "err")).append(" </dev/null");

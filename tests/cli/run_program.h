@@ -30,6 +30,9 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+// The path of the program under test.
+std::string program_path();
+
 // The program with these arguments; waits for its end.
 ProgramRun run_angiospline(const std::vector<std::string>& arguments);
 

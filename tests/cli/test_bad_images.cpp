@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/run_program.h"
-#include "tests/io/dicom_slice.h"
+#include "tests/shapes/dicom_slice.h"
 
 namespace angiospline::test {
 namespace {

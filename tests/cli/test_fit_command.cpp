@@ -8,10 +8,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/centerline_export.h"
-#include "io/centerline_file.h"
-#include "io/image_file.h"
-#include "io/model_file.h"
+#include "io/centerlines/centerline_export.h"
+#include "io/centerlines/centerline_file.h"
+#include "io/images/image_file.h"
+#include "io/model/model_file.h"
 #include "tests/cli/run_program.h"
 
 namespace angiospline::test {

@@ -11,7 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "io/image_file.h"
+#include "io/images/image_file.h"
 #include "tests/cli/run_program.h"
 
 namespace angiospline::test {
@@ -32,7 +32,7 @@ TerminalRun stopped_at(const std::string& stage, std::vector<std::string> argume
   int terminal = -1;
   const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
   if (child == 0) {
-    arguments.insert(arguments.begin(), ANGIOSPLINE_PROGRAM);
+    arguments.insert(arguments.begin(), program_path());
     std::vector<char*> pointers;
     for (std::string& word : arguments) pointers.push_back(word.data());
     pointers.push_back(nullptr);

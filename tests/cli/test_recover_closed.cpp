@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/image_file.h"
-#include "recovery/phantom.h"
+#include "io/images/image_file.h"
+#include "recovery/phantoms/phantom.h"
 #include "tests/cli/run_program.h"
 
 namespace angiospline::test {

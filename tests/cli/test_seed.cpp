@@ -158,8 +158,8 @@ TEST(SeedFullDisk, IsOneLineAndLeavesNoFileOfAnyFormat) {
   for (const char* suffix : {"step", "igs", "brep", "glb", "stl", "vtp", "json", "html"}) {
     const std::string target = folder / (std::string("model.") + suffix);
     const std::string command =
-        fmt::format("ulimit -f 4; exec '{}' seed '{}' -o '{}' 2>'{}' >/dev/null",
-                    ANGIOSPLINE_PROGRAM, tree, target, folder / "err");
+        fmt::format("ulimit -f 4; exec '{}' seed '{}' -o '{}' 2>'{}' >/dev/null", program_path(),
+                    tree, target, folder / "err");
     const int status = std::system(("bash -c \"" + command + "\"").c_str());
     ASSERT_TRUE(WIFEXITED(status)) << suffix;
     EXPECT_EQ(WEXITSTATUS(status), 2) << suffix;
@@ -181,7 +181,7 @@ pid_t start_program(const std::vector<std::string>& arguments) {
   const int nowhere = open("/dev/null", O_RDWR);
   for (const int stream : {0, 1, 2}) dup2(nowhere, stream);
   std::vector<std::string> words = arguments;
-  words.insert(words.begin(), ANGIOSPLINE_PROGRAM);
+  words.insert(words.begin(), program_path());
   std::vector<char*> pointers;
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/model_file.h"
+#include "io/model/model_file.h"
 #include "tests/cli/run_program.h"
 
 namespace angiospline::test {

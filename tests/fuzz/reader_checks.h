@@ -6,15 +6,15 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "io/csv_centerline.h"
-#include "io/graphml_file.h"
-#include "io/gxl_file.h"
-#include "io/network_tables.h"
-#include "io/simvascular_file.h"
-#include "io/swc_file.h"
-#include "io/tree_definition.h"
-#include "io/vtk_centerline.h"
-#include "modeling/smooth_centerlines.h"
+#include "io/centerlines/csv_centerline.h"
+#include "io/centerlines/graphml_file.h"
+#include "io/centerlines/gxl_file.h"
+#include "io/centerlines/network_tables.h"
+#include "io/centerlines/simvascular_file.h"
+#include "io/centerlines/swc_file.h"
+#include "io/centerlines/tree_definition.h"
+#include "io/centerlines/vtk_centerline.h"
+#include "modeling/tree/smooth_centerlines.h"
 
 namespace angiospline::fuzz {
 

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "kernel/evaluator.h"
-#include "tests/kernel/random_splines.h"
+#include "kernel/spline/evaluator.h"
+#include "tests/shapes/random_splines.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define ANGIOSPLINE_OWN_MALLOC 0

@@ -4,18 +4,18 @@
 
 #include <gtest/gtest.h>
 
-#include "kernel/closest_point.h"
-#include "kernel/control_mesh.h"
-#include "kernel/curvature.h"
-#include "kernel/evaluator.h"
-#include "kernel/fit.h"
-#include "kernel/grid.h"
-#include "kernel/rational.h"
-#include "kernel/reduce.h"
-#include "kernel/refinement.h"
-#include "kernel/reshape.h"
-#include "kernel/split.h"
-#include "tests/kernel/random_splines.h"
+#include "kernel/evaluate/closest_point.h"
+#include "kernel/evaluate/curvature.h"
+#include "kernel/evaluate/grid.h"
+#include "kernel/evaluate/rational.h"
+#include "kernel/fit/fit.h"
+#include "kernel/reduce/reduce.h"
+#include "kernel/refine/control_mesh.h"
+#include "kernel/refine/refinement.h"
+#include "kernel/refine/reshape.h"
+#include "kernel/refine/split.h"
+#include "kernel/spline/evaluator.h"
+#include "tests/shapes/random_splines.h"
 
 namespace angiospline {
 namespace {

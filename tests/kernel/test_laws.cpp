@@ -4,14 +4,14 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "kernel/curvature.h"
-#include "kernel/fit.h"
-#include "kernel/grid.h"
-#include "kernel/reduce.h"
-#include "kernel/refinement.h"
-#include "kernel/reshape.h"
-#include "kernel/split.h"
-#include "tests/kernel/random_splines.h"
+#include "kernel/evaluate/curvature.h"
+#include "kernel/evaluate/grid.h"
+#include "kernel/fit/fit.h"
+#include "kernel/reduce/reduce.h"
+#include "kernel/refine/refinement.h"
+#include "kernel/refine/reshape.h"
+#include "kernel/refine/split.h"
+#include "tests/shapes/random_splines.h"
 
 namespace angiospline {
 namespace {

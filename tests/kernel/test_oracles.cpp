@@ -10,9 +10,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "kernel/grid.h"
-#include "kernel/refinement.h"
-#include "tests/kernel/random_splines.h"
+#include "kernel/evaluate/grid.h"
+#include "kernel/refine/refinement.h"
+#include "tests/shapes/random_splines.h"
 
 #ifdef ANGIOSPLINE_HAS_SISL
 #include <sisl.h>

@@ -9,14 +9,14 @@
 
 #include <gtest/gtest.h>
 
-#include "kernel/control_mesh.h"
-#include "kernel/evaluator.h"
-#include "kernel/rational.h"
-#include "kernel/reduce.h"
-#include "kernel/refinement.h"
-#include "kernel/reshape.h"
-#include "kernel/split.h"
-#include "tests/kernel/random_splines.h"
+#include "kernel/evaluate/rational.h"
+#include "kernel/reduce/reduce.h"
+#include "kernel/refine/control_mesh.h"
+#include "kernel/refine/refinement.h"
+#include "kernel/refine/reshape.h"
+#include "kernel/refine/split.h"
+#include "kernel/spline/evaluator.h"
+#include "tests/shapes/random_splines.h"
 
 namespace angiospline {
 namespace {

@@ -1,0 +1,26 @@
+// Takes out of a tree what has no length or no wall of its own, and says so.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "modeling/tree/centerline_tree.h"
+
+namespace angiospline {
+
+struct CleanedTree {
+  CenterlineTree tree;
+  std::vector<std::string> warnings;  // what was dropped, by name
+};
+
+// In this order: branches with a radius that is not positive and finite; points that repeat the one
+// before them; branches without length (their nodes
+// become one); spurs, that is terminal branches whose tip lies inside the lumen of another branch
+// of their node (shortest first, and never below two branches at a node); nodes of degree two,
+// whose branches are joined under the name "<from>_<to>"; points that were traced out of order (the
+// course turns back twice within six radii, and the other order is shorter). A ring without
+// junctions keeps one node. Inlets that vanish are replaced by the widest end of their component.
+// Names survive where their node or branch does. O(points log points).
+CleanedTree clean_tree(const CenterlineTree& tree);
+
+}  // namespace angiospline

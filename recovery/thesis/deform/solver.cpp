@@ -1,0 +1,346 @@
+#include "recovery/thesis/deform/solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SparseCholesky>
+#include <fmt/format.h>
+
+namespace angiospline {
+namespace {
+
+constexpr std::pair<DeformMethod, std::string_view> kMethods[] = {
+    {DeformMethod::kSparse, "sparse"},
+    {DeformMethod::kEulerSvd, "euler-svd"},
+    {DeformMethod::kEulerDft, "euler-dft"},
+    {DeformMethod::kEulerDftPhantom, "euler-dft-phantom"},
+    {DeformMethod::kCentral, "central"},
+    {DeformMethod::kCentralDft, "central-dft"},
+    {DeformMethod::kRungeKutta1, "runge-kutta-1"},
+    {DeformMethod::kRungeKutta4, "runge-kutta-4"}};
+
+// A factor fills in, and its making and its triangular solves grow faster than the mesh; conjugate
+// gradients on these well-conditioned matrices take some twenty products whatever its size. The
+// place of rest does not depend on their error, only the way there.
+constexpr int kMostFactorised = 10000;  // nodes
+constexpr double kMostCondition = 1e4;  // some 1,000 products
+constexpr double kGradientError = 1e-8;
+
+// Positions and velocities, in voxels and voxels per unit of time.
+struct State {
+  Points3 nodes, velocity;
+};
+
+// One mesh among one set of edges.
+class Motion {
+ public:
+  Motion(const DeformMesh& mesh, EdgePotentials potentials, double voxel_mm,
+         const DeformOptions& options)
+      : mesh_(mesh),
+        voxel_mm_(voxel_mm),
+        options_(options),
+        system_(mesh, voxel_mm, options.elements),
+        potentials_(std::move(potentials)) {
+    state_.nodes = system_.rest();
+    state_.velocity = Points3::Zero(3, state_.nodes.cols());
+  }
+
+  // Factorises what the method divides by.
+  Result<void> prepare() {
+    const double dt = options_.time_step, mass = options_.elements.mass;
+    const ElementOptions& e = options_.elements;
+    std::optional<PeriodicGrid> grid;
+    const bool circulant = options_.method == DeformMethod::kEulerDft ||
+                           options_.method == DeformMethod::kEulerDftPhantom ||
+                           options_.method == DeformMethod::kCentralDft;
+    if (circulant && !(grid = periodic_grid(mesh_)))
+      return fail({ErrorKind::kBadInput, "mesh is not one tube or contour", "mesh",
+                   std::string(to_string(options_.method)),
+                   "circulant methods need rows of nodes around a tube"});
+    const double sides = mesh_.is_contour() ? 2 : 4;
+    switch (options_.method) {
+      case DeformMethod::kSparse: {
+        const auto p = implicit_step(e, dt, potentials_.steepness());
+        const bool large = mesh_.node_count() > kMostFactorised;
+        if (large && system_.condition(p) <= kMostCondition) {
+          division_ = divide_by_gradients(system_.matrix(p), kGradientError);
+          break;
+        }
+        auto division = divide_by_sparse(system_.matrix(p));
+        if (!division) return fail(division.error());
+        division_ = std::move(*division);
+        break;
+      }
+      case DeformMethod::kEulerSvd:
+        division_ = divide_by_svd(system_.matrix({e.drag, e.damping, 0}));
+        break;
+      case DeformMethod::kEulerDft:
+      case DeformMethod::kEulerDftPhantom:
+        division_ = divide_by_circulant(*grid, sides * e.damping + e.drag, -e.damping,
+                                        options_.method == DeformMethod::kEulerDft
+                                            ? CirculantNodes::kPlain
+                                            : CirculantNodes::kPhantom);
+        break;
+      case DeformMethod::kCentral:
+        division_ = divide_by_svd(
+            system_.matrix({mass / (dt * dt) + e.drag / (2 * dt), e.damping / (2 * dt), 0}));
+        break;
+      case DeformMethod::kCentralDft:
+        division_ =
+            divide_by_circulant(*grid, mass / (dt * dt) + (sides * e.damping + e.drag) / (2 * dt),
+                                -e.damping / (2 * dt), CirculantNodes::kPlain);
+        break;
+      case DeformMethod::kRungeKutta1:
+      case DeformMethod::kRungeKutta4:
+        break;  // M is diagonal
+    }
+    return {};
+  }
+
+  void step() {
+    const double dt = options_.time_step;
+    switch (options_.method) {
+      case DeformMethod::kSparse:
+      case DeformMethod::kEulerSvd:
+      case DeformMethod::kEulerDft:
+      case DeformMethod::kEulerDftPhantom:
+        state_.nodes += dt * (*division_)(forces(state_.nodes));
+        break;
+      case DeformMethod::kCentral:
+      case DeformMethod::kCentralDft:
+        central_difference();
+        break;
+      case DeformMethod::kRungeKutta1: {
+        const State slope = slope_at(state_);
+        state_ = {state_.nodes + dt * slope.nodes, state_.velocity + dt * slope.velocity};
+        break;
+      }
+      case DeformMethod::kRungeKutta4:
+        runge_kutta_4();
+        break;
+    }
+  }
+
+  const Points3& nodes() const { return state_.nodes; }
+  const ElementSystem& system() const { return system_; }
+  EdgePotentials& potentials() { return potentials_; }
+
+  Points3 pull(const Points3& nodes) {
+    Points3 normals;
+    if (options_.potential.most_angle_deg) {
+      mesh_.nodes_mm = nodes * voxel_mm_;
+      normals = node_normals(mesh_);
+    }
+    return potentials_.forces(nodes, normals);
+  }
+
+ private:
+  Points3 forces(const Points3& nodes) {
+    return pull(nodes) + system_.internal(nodes, options_.form);
+  }
+
+  State slope_at(const State& s) {
+    return {s.velocity, (forces(s.nodes) + system_.damping(s.velocity, options_.form)) /
+                            options_.elements.mass};
+  }
+
+  void runge_kutta_4() {
+    const double dt = options_.time_step;
+    const auto ahead = [&](const State& slope, double t) {
+      return State{state_.nodes + t * slope.nodes, state_.velocity + t * slope.velocity};
+    };
+    const State k1 = slope_at(state_);
+    const State k2 = slope_at(ahead(k1, dt / 2));
+    const State k3 = slope_at(ahead(k2, dt / 2));
+    const State k4 = slope_at(ahead(k3, dt));
+    state_.nodes += dt / 6 * (k1.nodes + 2 * k2.nodes + 2 * k3.nodes + k4.nodes);
+    state_.velocity += dt / 6 * (k1.velocity + 2 * k2.velocity + 2 * k3.velocity + k4.velocity);
+  }
+
+  void central_difference() {
+    const double dt = options_.time_step, mass = options_.elements.mass;
+    if (before_.cols() == 0) {  // a first-order Runge-Kutta step starts it
+      before_ = state_.nodes;
+      const State slope = slope_at(state_);
+      state_.nodes += dt * (state_.velocity + dt * slope.velocity);
+      return;
+    }
+    // (M / dt^2 + C / 2dt) q+ = f - (M / dt^2) (q- - 2 q) + (C / 2dt) q-, written for q+ - q so
+    // that the pseudo-inverse of displacements does not meet positions.
+    const Points3 last = state_.nodes - before_;
+    const Points3 b = forces(state_.nodes) + mass / (dt * dt) * last +
+                      system_.damping(last, options_.form) / (2 * dt);
+    before_ = state_.nodes;
+    state_.nodes += (*division_)(b);
+  }
+
+  DeformMesh mesh_;
+  double voxel_mm_;
+  DeformOptions options_;
+  ElementSystem system_;
+  EdgePotentials potentials_;
+  std::unique_ptr<Division> division_;
+  State state_;
+  Points3 before_;
+};
+
+Result<void> check(const DeformMesh& start, double voxel_mm, const DeformOptions& options) {
+  const auto bad = [](const char* what, double value, const char* rule) {
+    return fail({ErrorKind::kBadInput, what, "deformation", fmt::format("{}", value), rule});
+  };
+  if (start.node_count() < 3)
+    return bad("mesh is too small", start.node_count(), "3 nodes or more");
+  if (!start.nodes_mm.allFinite()) return bad("mesh is not finite", NAN, "coordinates are numbers");
+  if (!(voxel_mm > 0)) return bad("voxel is not usable", voxel_mm, "mm, above 0");
+  if (!(options.time_step > 0) || !std::isfinite(options.time_step))
+    return bad("time step is not usable", options.time_step, "above 0");
+  if (options.most_iterations < 1)
+    return bad("number of iterations is not usable", options.most_iterations, "at least 1");
+  if (!(options.rest_speed > 0))
+    return bad("speed of rest is not usable", options.rest_speed, "above 0");
+  if (options.window < 1) return bad("window is not usable", options.window, "at least 1");
+  if (has_mass(options.method) && !(options.elements.mass > 0))
+    return bad("mass is not usable", options.elements.mass, "above 0 for a method with mass");
+  return options.elements.check();
+}
+
+}  // namespace
+
+std::string_view to_string(DeformMethod method) {
+  for (const auto& [m, name] : kMethods)
+    if (m == method) return name;
+  return "?";
+}
+
+std::optional<DeformMethod> deform_method(std::string_view name) {
+  for (const auto& [m, n] : kMethods)
+    if (n == name) return m;
+  return std::nullopt;
+}
+
+bool has_mass(DeformMethod method) {
+  return method == DeformMethod::kCentral || method == DeformMethod::kCentralDft ||
+         method == DeformMethod::kRungeKutta1 || method == DeformMethod::kRungeKutta4;
+}
+
+namespace {
+
+// The least eigenvalue of the damping that is not that of a translation.
+double least_eigenvalue(const Eigen::SparseMatrix<double>& L) {
+  constexpr Eigen::Index kDense = 1500;
+  if (L.rows() <= kDense) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(L),
+                                                               Eigen::EigenvaluesOnly);
+    return eigen.eigenvalues()[1];  // [0] is the translation's, 0
+  }
+  constexpr double kShift = 1e-9;
+  Eigen::SparseMatrix<double> shifted = L;
+  shifted.diagonal().array() += kShift;
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> inverse(shifted);
+  Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(L.rows(), -1, 1);
+  for (int k = 0; k < 60; ++k) {
+    x.array() -= x.mean();
+    x = inverse.solve(x.normalized()).eval();
+  }
+  x.array() -= x.mean();
+  x.normalize();
+  return x.dot(L * x);
+}
+
+}  // namespace
+
+DeformOptions steady_options(DeformMethod method, const DeformMesh& mesh, PotentialKind kind,
+                             double strength, double reach_vox) {
+  DeformOptions o = method == DeformMethod::kSparse ? DeformOptions() : thesis_options(method);
+  o.potential.kind = kind;
+  o.potential.strength = strength;
+  o.potential.reach_vox = reach_vox;
+  // Other methods bear their step; what cannot be used is for deform() to name.
+  if (method == DeformMethod::kSparse || has_mass(method)) return o;
+  if (!(strength > 0) || !(reach_vox > 0) || mesh.node_count() < 3) return o;
+  const ElementSystem system(mesh, 1.0, o.elements);
+  const double steepness = kind == PotentialKind::kGravity ? strength / 2 : strength / reach_vox;
+  o.time_step = std::min(0.4, 1.85 * least_eigenvalue(system.laplacian()) / steepness);
+  return o;
+}
+
+std::string_view to_string(Termination termination) {
+  switch (termination) {
+    case Termination::kAtRest:
+      return "at rest";
+    case Termination::kIterationLimit:
+      return "iteration limit";
+    case Termination::kUnstable:
+      return "unstable";
+  }
+  return "?";
+}
+
+DeformOptions thesis_options(DeformMethod method) {
+  DeformOptions o;
+  o.method = method;
+  o.elements = {};
+  o.elements.drag = has_mass(method) ? 0.2 : 0.0;
+  o.potential = {};
+  // A massless step divides by damping and may be long; one with mass follows the swinging.
+  o.time_step = has_mass(method) ? 0.02 : 0.1;
+  o.rest_speed = 0.1;
+  o.window = has_mass(method) ? 50 : 10;
+  return o;
+}
+
+Result<Deformation> deform(const DeformMesh& start, const EdgePoints& edges, double voxel_mm,
+                           const DeformOptions& options, const Progress& progress) {
+  if (const auto ok = check(start, voxel_mm, options); !ok) return fail(ok.error());
+  auto potentials = EdgePotentials::make(edges, voxel_mm, options.potential);
+  if (!potentials) return fail(potentials.error());
+  Motion motion(start, std::move(*potentials), voxel_mm, options);
+  if (const auto ok = motion.prepare(); !ok) return fail(ok.error());
+
+  Deformation out{start, {}};
+  DeformReport& report = out.report;
+  const Points3 rest = motion.system().rest();
+  const double diagonal = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
+  Points3 last = rest, sum = Points3::Zero(3, rest.cols()), mean_before;
+  while (report.iterations < options.most_iterations) {
+    if (progress.should_stop()) return fail(cancelled("deforming"));
+    motion.step();
+    ++report.iterations;
+    const Points3& now = motion.nodes();
+    if (!now.allFinite() || (now - rest).colwise().norm().maxCoeff() > diagonal) {
+      report.termination = Termination::kUnstable;
+      break;
+    }
+    last = now;
+    sum += now;
+    if (report.iterations % options.window != 0) continue;
+    const Points3 mean = sum / options.window;
+    sum.setZero();
+    if (mean_before.cols() > 0 && (mean - mean_before).colwise().norm().maxCoeff() <=
+                                      options.rest_speed * options.window * options.time_step) {
+      report.termination = Termination::kAtRest;
+      last = mean;
+      break;
+    }
+    mean_before = mean;
+    progress.at("deforming", static_cast<double>(report.iterations) / options.most_iterations);
+  }
+  out.mesh.nodes_mm = last * voxel_mm;
+  report.residual_force = motion.pull(last).colwise().norm().transpose();
+  report.edges_per_node = motion.potentials().pulls_per_node();
+  report.nearest_asked = motion.potentials().asked();
+  const Eigen::VectorXd moved = (out.mesh.nodes_mm - start.nodes_mm).colwise().norm();
+  report.moved_mean_mm = moved.mean();
+  report.moved_most_mm = moved.maxCoeff();
+  return out;
+}
+
+MeshField residual_field(const DeformReport& report, const TriangleMesh& mesh) {
+  MeshField field{"residual_force", Eigen::VectorXd::Zero(mesh.points_mm.cols())};
+  field.values.head(report.residual_force.size()) = report.residual_force;
+  return field;
+}
+
+}  // namespace angiospline
