@@ -47,11 +47,11 @@ Faces faces_of(const Mask& mask) {
 
 // From each face of `from` the distance to the nearest of `to`.
 std::vector<double> distances(const Faces& from, const Faces& to) {
-  const PointIndex index(to.centres);
+  const PointIndex places_index(to.centres);
   std::vector<double> out(from.centres.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, out.size(), 1024), [&](const auto& range) {
     for (std::size_t k = range.begin(); k != range.end(); ++k) {
-      out[k] = index.nearest(from.centres[k]).distance;
+      out[k] = places_index.nearest(from.centres[k]).distance;
     }
   });
   return out;

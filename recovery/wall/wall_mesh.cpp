@@ -62,9 +62,9 @@ std::vector<char> nodes_near_rims(const SurfaceNetwork& network, const FitMesh& 
   for (std::size_t r = 0; r < network.rims.size(); ++r) {
     centers.col(static_cast<Eigen::Index>(r)) = network.rims[r].center_mm;
   }
-  const PointIndex index(centers);
+  const PointIndex rim_centers(centers);
   for (std::size_t k = 0; k < near.size(); ++k) {
-    const Rim& rim = network.rims[index(index.nearest(mesh.nodes[k].point_mm).point)];
+    const Rim& rim = network.rims[index(rim_centers.nearest(mesh.nodes[k].point_mm).point)];
     const Vec3 d = mesh.nodes[k].point_mm - rim.center_mm;
     near[k] = std::abs(rim.normal.dot(d)) <= margin_mm && d.norm() < 2 * rim.radius_mm + margin_mm;
   }

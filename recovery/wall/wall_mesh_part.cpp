@@ -21,10 +21,10 @@ Eigen::VectorXd FitMeshPart::spread(const Eigen::VectorXd& values, int whole) co
 }
 
 FitMeshPart part_near(const FitMesh& whole, const Points3& places, double reach) {
-  const PointIndex index(places);
+  const PointIndex places_index(places);
   std::vector<char> near(whole.nodes.size(), 0);
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t k) {
-    near[k] = index.nearest(whole.nodes[k].point_mm).distance <= reach;
+    near[k] = places_index.nearest(whole.nodes[k].point_mm).distance <= reach;
   });
   FitMeshPart part;
   std::vector<int> node_of(near.size(), -1);
@@ -56,10 +56,10 @@ FitMeshPart part_near(const FitMesh& whole, const Points3& places, double reach)
 }
 
 std::vector<int> nearest_nodes(const FitMesh& of, const FitMesh& to) {
-  const PointIndex index(node_points(of));
+  const PointIndex places_index(node_points(of));
   std::vector<int> nearest(to.nodes.size());
   tbb::parallel_for(std::size_t{0}, nearest.size(), [&](std::size_t k) {
-    nearest[k] = static_cast<int>(index.nearest(to.nodes[k].point_mm).point);
+    nearest[k] = static_cast<int>(places_index.nearest(to.nodes[k].point_mm).point);
   });
   return nearest;
 }

@@ -35,13 +35,13 @@ EdgePoints edge_points(const EdgeField& field, const ImageGrid& grid) {
 }
 
 void NearestNodes::ask(const Points3& nodes, const std::vector<int>& which) {
-  const PointIndex index(nodes);
+  const PointIndex places_index(nodes);
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, which.size(), 256),
       [&](const tbb::blocked_range<std::size_t>& r) {
         for (std::size_t k = r.begin(); k != r.end(); ++k) {
           const int p = which[k];
-          const auto [near, next] = index.nearest_two(points_.col(p));
+          const auto [near, next] = places_index.nearest_two(points_.col(p));
           const double first = near.distance, second = next.distance;
           const double gap = second - first - kRounding * (first + second + travelled_);
           nearest_[static_cast<std::size_t>(p)] = static_cast<int>(near.point);
