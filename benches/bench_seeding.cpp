@@ -144,9 +144,10 @@ struct Tally {
   std::string remarks;
 };
 
-bool names_overlap(const std::vector<std::string>& warnings) {
-  return std::any_of(warnings.begin(), warnings.end(), [](const std::string& text) {
-    return text.find("overlap") != std::string::npos || text.find("too near") != std::string::npos;
+bool names_overlap(const std::vector<Warning>& warnings) {
+  return std::any_of(warnings.begin(), warnings.end(), [](const Warning& warning) {
+    return warning.code == WarningCode::kVesselsOverlap ||
+           warning.code == WarningCode::kClearanceMissing;
   });
 }
 
@@ -156,7 +157,8 @@ void judge(const CenterlineTree& tree, int number, Tally& tally) {
     tally.remarks += fmt::format("  [{}] {}\n", number, text);
   };
   const auto smoothed = smooth_centerlines(tree);
-  const auto seeded = smoothed ? build_with_room(*smoothed) : Result<BuiltModel>(fail(smoothed.error()));
+  const auto seeded =
+      smoothed ? build_with_room(*smoothed) : Result<BuiltModel>(fail(smoothed.error()));
   if (!seeded) {
     ++tally.refused;
     remark(seeded.error().message());
@@ -209,7 +211,7 @@ void judge(const CenterlineTree& tree, int number, Tally& tally) {
         fmt::format("axis {:.2g} radii off in {}", f.largest_axis_offset, f.largest_offset_branch));
   }
   if (std::getenv("BENCH_SEEDING_WARNINGS") != nullptr) {
-    for (const std::string& text : model->warnings) remark("warned: " + text);
+    for (const std::string& text : texts_of(model->warnings)) remark("warned: " + text);
   }
 }
 

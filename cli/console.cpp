@@ -94,7 +94,9 @@ void Console::say(std::string_view text) const {
   fmt::print(stderr, "{}\n", text);
 }
 
-void Console::warn(std::string_view text) const { say(fmt::format("warning: {}", text)); }
+void Console::warn(const Warning& warning) const {
+  say(fmt::format("warning [{}]: {}", name_of(warning.code), warning.text));
+}
 
 int report_error(const Error& error) {
   fmt::print(stderr, "angiospline: {}\n", error.message());

@@ -7,6 +7,7 @@
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "base/warning.h"
 
 namespace angiospline::cli {
 
@@ -25,9 +26,9 @@ class Console {
   Console& operator=(const Console&) = delete;
 
   Progress progress() const;
-  void finish_line() const;               // leaves the progress line behind before other talk
-  void say(std::string_view text) const;  // one line on stderr
-  void warn(std::string_view text) const;
+  void finish_line() const;                 // leaves the progress line behind before other talk
+  void say(std::string_view text) const;    // one line on stderr
+  void warn(const Warning& warning) const;  // one line, "warning [code]: text"
 
  private:
   struct State;

@@ -52,7 +52,8 @@ Json segmentation_json(const SegmentReport& report) {
           {"seeds_mm", seeds},
           {"seeds_found", report.seeds_found},
           {"assumptions", report.choices},
-          {"warnings", report.warnings}};
+          {"warnings", texts_of(report.warnings)},
+          {"warning_codes", code_names_of(report.warnings)}};
 }
 
 Json graph_json(const CenterlineTree& tree) {
@@ -95,10 +96,15 @@ Json model_json(const Model& model) {
   Json failed = Json::array();
   for (const FailedPart& part : model.failed)
     failed.push_back({{"name", part.name}, {"why", part.why}});
-  return {{"branches", model.tree.branches.size()},  {"junctions", junction_count(model.tree)},
-          {"loops", cycle_count(model.tree)},        {"components", component_count(model.tree)},
-          {"patches", model.network.patches.size()}, {"failed", failed},
-          {"assumptions", model.assumptions},        {"warnings", model.warnings}};
+  return {{"branches", model.tree.branches.size()},
+          {"junctions", junction_count(model.tree)},
+          {"loops", cycle_count(model.tree)},
+          {"components", component_count(model.tree)},
+          {"patches", model.network.patches.size()},
+          {"failed", failed},
+          {"assumptions", model.assumptions},
+          {"warnings", texts_of(model.warnings)},
+          {"warning_codes", code_names_of(model.warnings)}};
 }
 
 Json fidelity_json(const Fidelity& f) {

@@ -55,7 +55,7 @@ void append_warnings(Model& model, const ExportReport& report) {
 int tell_outcome(const Model& model, const Certificate& certificate,
                  const std::vector<std::string>& files, const Console& console) {
   for (const std::string& text : model.assumptions) console.say("note: " + text);
-  for (const std::string& text : model.warnings) console.warn(text);
+  for (const Warning& warning : model.warnings) console.warn(warning);
   for (const FailedPart& part : model.failed) {
     console.say(fmt::format("failed: {}: {}", part.name, part.why));
   }

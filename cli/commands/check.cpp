@@ -45,7 +45,7 @@ int run_check(const CheckArguments& arguments) {
   if (!certificate) return report_error(certificate.error());
   const auto fidelity = fidelity_of(*any, console.progress());
   console.finish_line();
-  for (const std::string& text : certificate->warnings) console.warn(text);
+  for (const Warning& warning : certificate->warnings) console.warn(warning);
   if (arguments.json) {
     Json json = to_json(*certificate);
     if (fidelity) json["fidelity"] = fidelity_json(*fidelity);

@@ -24,7 +24,7 @@ int run_convert(const ConvertArguments& arguments) {
   if (const auto* model = std::get_if<Model>(&*any)) {
     const auto report = export_model(*model, paths, options, console.progress());
     if (!report) return report_error(report.error());
-    for (const std::string& text : report->warnings) console.warn(text);
+    for (const Warning& warning : report->warnings) console.warn(warning);
   } else if (const auto* solid = std::get_if<Solid>(&*any)) {
     written = export_solid(*solid, input.stem().string(), paths, options, console.progress());
   } else {

@@ -109,7 +109,8 @@ Result<Model> model_of(const CenterlineTree& tree, const Mask& closed,
   }
   auto model = build_model(tree, {}, progress);
   if (model && unfit) {
-    model->warnings.push_back("the walls were not fitted to the image: " + unfit->message());
+    model->warnings.push_back({WarningCode::kWallsNotFitted,
+                               "the walls were not fitted to the image: " + unfit->message()});
   }
   if (model) {
     if (auto added = add_closed_pieces(*model, closed, nullptr); !added) return fail(added.error());

@@ -98,7 +98,7 @@ int run_segment(const SegmentArguments& arguments) {
     print_json(json);
   }
   for (const std::string& text : report.choices) console.say("note: " + text);
-  for (const std::string& text : report.warnings) console.warn(text);
+  for (const Warning& warning : report.warnings) console.warn(warning);
   console.say(fmt::format("{} vessel voxels of {} examined, {} more filled -> {}",
                           report.grown.voxels, report.grown.examined, report.filled_voxels,
                           arguments.output));

@@ -61,7 +61,8 @@ bool tell_parts(const SmoothedNetwork& smoothed, Model& model, const Console& co
     if (part.outcome != SmoothedPart::Outcome::kRefused) continue;
     ++refused;
     console.say(fmt::format("refused: {}: {}", part.name, part.why));
-    model.warnings.push_back(fmt::format("{} could not be smoothed: {}", part.name, part.why));
+    model.warnings.push_back({WarningCode::kPartNotSmoothed,
+                              fmt::format("{} could not be smoothed: {}", part.name, part.why)});
   }
   console.say(fmt::format(
       "{} of {} parts smoothed, {} refused: largest normal angle {:.3g} -> {:.3g} degrees", moved,

@@ -213,7 +213,8 @@ class ModelWriter {
     auto made = tessellate(model_.network, options_.tessellation, progress_);
     if (!made) return fail(made.error());
     if (made->used.chord_tolerance > options_.tessellation.chord_tolerance) {
-      report_.warnings.push_back(coarsened(options_.tessellation, made->used));
+      report_.warnings.push_back(
+          {WarningCode::kMeshCoarsened, coarsened(options_.tessellation, made->used)});
     }
     mesh_ = std::move(made->mesh);
     return {};

@@ -9,6 +9,7 @@
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "base/warning.h"
 #include "io/cad/split_joins.h"
 #include "io/cad/step_file.h"
 #include "modeling/network/model.h"
@@ -31,7 +32,7 @@ struct ExportOptions {
 
 // What a reader of the files should know, beyond the model's own warnings.
 struct ExportReport {
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 // The suffixes that export_model writes, for messages: ".json .step ...".

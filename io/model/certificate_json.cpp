@@ -51,7 +51,8 @@ json to_json(const Certificate& c) {
   }
   result["self_intersection_resolution_mm"] = c.self_intersection_resolution_mm;
   result["edge_samples"] = c.edge_samples;
-  result["warnings"] = c.warnings;
+  result["warnings"] = texts_of(c.warnings);
+  result["warning_codes"] = code_names_of(c.warnings);
   return result;
 }
 
@@ -97,7 +98,7 @@ std::string to_text(const Certificate& c) {
     line("largest curvature x radius",
          fmt::format("{:.4g}, {}", *c.max_curvature_times_radius, c.max_curvature_face));
   }
-  for (const std::string& warning : c.warnings) line("warning", warning);
+  for (const Warning& warning : c.warnings) line("warning", warning.text);
   return text;
 }
 

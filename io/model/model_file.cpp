@@ -111,6 +111,8 @@ class Cursor {
  public:
   Cursor(const Json& json, const std::string& file) : json_(json), file_(file) {}
 
+  bool has(const char* key) const { return json_.is_object() && json_.contains(key); }
+
   Cursor operator[](const char* key) const {
     if (!json_.is_object()) refuse("an object is needed");
     const auto found = json_.find(key);
@@ -275,6 +277,20 @@ CenterlineTree read_tree(const Cursor& c) {
   return tree;
 }
 
+// Files of earlier releases have texts alone; their warnings stay without a code.
+std::vector<Warning> read_warnings(const Cursor& c) {
+  std::vector<Warning> warnings = c["warnings"].each([](const Cursor& w) {
+    return Warning{{}, w.text()};
+  });
+  if (!c.has("warning_codes")) return warnings;
+
+  const Cursor codes = c["warning_codes"];
+  if (codes.size() != warnings.size()) codes.refuse("a code for each warning");
+  for (std::size_t k = 0; k < warnings.size(); ++k)
+    warnings[k].code = warning_code(codes[k].text());
+  return warnings;
+}
+
 Model read_document(const Cursor& c) {
   if (c["schema"].text() != kSchema) c["schema"].refuse(std::string(kSchema), "unknown schema");
   if (c["schema_version"].integer() != kModelSchemaVersion) {
@@ -285,7 +301,7 @@ Model read_document(const Cursor& c) {
   Model model;
   model.name = c["name"].text();
   model.assumptions = read_texts(c["assumptions"]);
-  model.warnings = read_texts(c["warnings"]);
+  model.warnings = read_warnings(c);
   model.failed = c["failed"].each([](const Cursor& f) {
     return FailedPart{f["name"].text(), f["why"].text()};
   });
@@ -310,7 +326,8 @@ std::string model_to_json(const Model& model) {
        {{"program", "angiospline"}, {"version", version()}, {"source", model.tree.source}}},
       {"name", model.name},
       {"assumptions", model.assumptions},
-      {"warnings", model.warnings},
+      {"warnings", texts_of(model.warnings)},
+      {"warning_codes", code_names_of(model.warnings)},
       {"failed", std::move(failed)},
       {"tree", to_json(model.tree)},
       {"network", to_json(model.network)}};

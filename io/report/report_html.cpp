@@ -152,7 +152,7 @@ Json facts_json(const Model& model, const TriangleMesh& mesh, const ReportExtras
       {"name", valid_utf8(model.name)},
       {"source", valid_utf8(model.tree.source)},
       {"assumptions", texts(model.assumptions)},
-      {"warnings", texts(model.warnings)},
+      {"warnings", texts(texts_of(model.warnings))},
       {"failed", std::move(failed)},
       {"summary", summary_json(model, branches, junctions.size())},
       {"branches", std::move(branches)},

@@ -243,11 +243,13 @@ class Seeder {
   void warn_of_unfair_junctions(Model& model) const {
     for (const Junction& junction : junctions_) {
       if (junction.fair) continue;
-      model.warnings.push_back(fmt::format(
-          "{} is smooth but not fair: its curvature times the smallest radius is {:.3g}, and it "
-          "departs from its branches by {:.2g} of that radius (below 20 and 0.5 are fair)",
-          junction.network.regions.front().name, junction.curvature_times_radius,
-          junction.distance_over_radius));
+      model.warnings.push_back(
+          {WarningCode::kJunctionNotFair,
+           fmt::format(
+               "{} is smooth but not fair: its curvature times the smallest radius is {:.3g}, and "
+               "it departs from its branches by {:.2g} of that radius (below 20 and 0.5 are fair)",
+               junction.network.regions.front().name, junction.curvature_times_radius,
+               junction.distance_over_radius)});
     }
   }
 
@@ -273,7 +275,7 @@ class Seeder {
       if (outcome.folded) folded_.push_back(static_cast<int>(b));
       for (BodyPiece& piece : outcome.pieces) pieces_.push_back(std::move(piece));
       for (ClosedOpening& closed : outcome.closed) closed_.push_back(std::move(closed));
-      for (std::string& text : outcome.warnings) warnings_.push_back(std::move(text));
+      for (Warning& warning : outcome.warnings) warnings_.push_back(std::move(warning));
       if (outcome.failed) failed_.push_back(std::move(*outcome.failed));
     }
     return true;
@@ -309,14 +311,14 @@ class Seeder {
   std::vector<BodyPiece> pieces_;
   std::vector<ClosedOpening> closed_;
   std::vector<int> folded_;  // branches whose body folds
-  std::vector<std::string> warnings_;
+  std::vector<Warning> warnings_;
   std::vector<FailedPart> failed_;
 };
 
 }  // namespace
 
 Result<Model> build_model(const CenterlineTree& tree, const BuildOptions& options,
-                         const Progress& progress) {
+                          const Progress& progress) {
   Result<SmoothedTree> smoothed = smooth_for_build(tree, options, progress);
   if (!smoothed) return fail(smoothed.error());
   Result<BuiltModel> seeded = build_with_room(*std::move(smoothed), options, progress);
@@ -325,7 +327,7 @@ Result<Model> build_model(const CenterlineTree& tree, const BuildOptions& option
 }
 
 Result<SmoothedTree> smooth_for_build(const CenterlineTree& tree, const BuildOptions& options,
-                                     const Progress& progress) {
+                                      const Progress& progress) {
   Result<SmoothedTree> smoothed = smooth_centerlines(rounded(tree), options.smoothing, progress);
   if (!smoothed || !options.clearance) return smoothed;
   KeepApartOptions apart;
@@ -349,7 +351,7 @@ std::optional<Error> without_branches(const SmoothedTree& tree) {
 }  // namespace
 
 Result<Model> build_smoothed(const SmoothedTree& tree, const BuildOptions& options,
-                            const Progress& progress) {
+                             const Progress& progress) {
   if (const auto error = without_branches(tree)) return fail(*error);
   progress.at("plan", 0.0);
   Seeder seeder(tree, options, progress);
@@ -357,7 +359,7 @@ Result<Model> build_smoothed(const SmoothedTree& tree, const BuildOptions& optio
 }
 
 Result<BuiltModel> build_with_room(SmoothedTree tree, const BuildOptions& options,
-                              const Progress& progress) {
+                                   const Progress& progress) {
   if (const auto error = without_branches(tree)) return fail(*error);
   RoomMaker room(tree);
   BuiltByName known;

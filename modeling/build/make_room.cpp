@@ -162,8 +162,9 @@ void RoomMaker::thin(std::size_t b, SmoothedTree& tree) const {
     branch.radii_mm(i) *= share_at(b, scale * along);
   }
   tree.warnings.push_back(
-      fmt::format("branch {} was thinned to {:.0f} % so that the junctions near it have room",
-                  branch.name, 100 * kept));
+      {WarningCode::kThinnedForJunctions,
+       fmt::format("branch {} was thinned to {:.0f} % so that the junctions near it have room",
+                   branch.name, 100 * kept)});
 }
 
 SmoothedTree RoomMaker::tree() {

@@ -198,7 +198,8 @@ void Plan::join_through(int n) {
 
 void Plan::drop(int b, const std::string& why) {
   PlannedBranch& branch = branches_[index(b)];
-  warnings_.push_back(fmt::format("branch {} was left out: {}", branch.name, why));
+  warnings_.push_back(
+      {WarningCode::kBranchLeftOut, fmt::format("branch {} was left out: {}", branch.name, why)});
   const int from = branch.from;
   const int to = branch.to;
   detach({b, false});
@@ -216,7 +217,8 @@ void Plan::merge(int b, double fits, const std::string& why) {
   PlannedNode& a = nodes_[index(kept)];
   PlannedNode& c = nodes_[index(gone)];
   warnings_.push_back(
-      fmt::format("junctions {} and {} became one: {} {}", a.name, c.name, branch.name, why));
+      {WarningCode::kJunctionsMerged,
+       fmt::format("junctions {} and {} became one: {} {}", a.name, c.name, branch.name, why)});
   // Thick branches hold the new node near their own.
   const auto weight = [&](const PlannedNode& node) {
     double sum = 0;
@@ -334,8 +336,9 @@ void Plan::extend(int b, double missing) {
   branch.samples = at_end ? longer : Eigen::Matrix4Xd(longer.rowwise().reverse());
   measure_length(branch);
   warnings_.push_back(
-      fmt::format("branch {} was made longer by {:.3g} mm: it ended within its junction",
-                  branch.name, missing));
+      {WarningCode::kBranchLengthened,
+       fmt::format("branch {} was made longer by {:.3g} mm: it ended within its junction",
+                   branch.name, missing)});
 }
 
 // ---------------------------------------------------------------- room along branches
@@ -394,9 +397,7 @@ bool Plan::has_room(int b) const {
 }
 
 // Where an opening is planned: at its wanted distance along its direction.
-double Plan::planned_mm(BranchEnd end) const {
-  return node_at(end).wanted_mm[index(slot_of(end))];
-}
+double Plan::planned_mm(BranchEnd end) const { return node_at(end).wanted_mm[index(slot_of(end))]; }
 
 // Curvature times radius that a body between two openings needs at least: that of the cubic between
 // them with their axes as tangents. 0 where an end is not an opening.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/warning.h"
 #include "modeling/junction/junction.h"
 #include "modeling/tree/smooth_centerlines.h"
 
@@ -89,7 +90,7 @@ class Plan {
 
   const std::vector<PlannedNode>& nodes() const { return nodes_; }
   const std::vector<PlannedBranch>& branches() const { return branches_; }
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::vector<Warning>& warnings() const { return warnings_; }
 
   // After a junction failed: look for directions farther out, or merge it with the nearest junction
   // no farther than `radii` of the branch between them. False if there is none. Then settle()
@@ -153,7 +154,7 @@ class Plan {
   std::vector<PlannedBranch> branches_;
   std::vector<std::vector<PlannedNode>> bends_;  // other ways to plan each node
   std::vector<char> dirty_;                      // nodes to measure again
-  std::vector<std::string> warnings_;
+  std::vector<Warning> warnings_;
 };
 
 }  // namespace angiospline

@@ -181,7 +181,8 @@ class BodyBuilder {
             FailedPart{"wall_" + branch.name, "nothing of it is left beyond its junctions"};
       } else {
         outcome.warnings.push_back(
-            fmt::format("branch {} ends at the opening of its junction", branch.name));
+            {WarningCode::kBranchCutAtJunction,
+             fmt::format("branch {} ends at the opening of its junction", branch.name)});
       }
       return outcome;
     }
@@ -207,20 +208,24 @@ class BodyBuilder {
       if (direct.body.jacobian_ratio > piece.body.jacobian_ratio) {
         piece = std::move(direct);
         outcome.warnings.push_back(
-            fmt::format("branch {} bends more tightly than its radius allows; it was straightened",
-                        branch.name));
+            {WarningCode::kBranchStraightened,
+             fmt::format("branch {} bends more tightly than its radius allows; it was straightened",
+                         branch.name)});
       }
     }
     if (piece.body.jacobian_ratio < kFoldedBody) {
       outcome.folded = true;
-      outcome.warnings.push_back(fmt::format("the wall of branch {} folds (Jacobian ratio {:.2g})",
-                                             branch.name, piece.body.jacobian_ratio));
+      outcome.warnings.push_back({WarningCode::kWallFolds,
+                                  fmt::format("the wall of branch {} folds (Jacobian ratio {:.2g})",
+                                              branch.name, piece.body.jacobian_ratio)});
     }
     if (const AxisDeparture off = departure(branch, start, end, piece);
         off.radii > kFarFromCenterline) {
-      outcome.warnings.push_back(fmt::format(
-          "the axis of branch {} leaves its centerline by up to {:.3g} mm ({:.2g} radii)",
-          branch.name, off.mm, off.radii));
+      outcome.warnings.push_back(
+          {WarningCode::kAxisOffCenterline,
+           fmt::format(
+               "the axis of branch {} leaves its centerline by up to {:.3g} mm ({:.2g} radii)",
+               branch.name, off.mm, off.radii)});
     }
     piece.name = "wall_" + branch.name;
     outcome.pieces.push_back(std::move(piece));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/warning.h"
 #include "modeling/build/assembly.h"
 #include "modeling/build/build_model.h"
 #include "modeling/build/plan.h"
@@ -16,7 +17,7 @@ namespace angiospline {
 struct PlannedBody {
   std::vector<BodyPiece> pieces;
   std::vector<ClosedOpening> closed;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::optional<FailedPart> failed;
   bool folded = false;
 };

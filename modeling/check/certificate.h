@@ -9,6 +9,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "base/vector.h"
+#include "base/warning.h"
 #include "modeling/solid/solid.h"
 
 namespace angiospline {
@@ -58,7 +59,7 @@ struct Certificate {
   std::vector<FaceCrossing> self_intersections;  // one for each pair of names
   double self_intersection_resolution_mm = 0.0;  // overlaps thinner than this may be missed
   int edge_samples = 0;                          // points at which gaps and angles were taken
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 // The certificate of a solid by anyone. Normals and gaps are sampled on every shared edge, corners

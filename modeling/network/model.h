@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/warning.h"
 #include "modeling/network/surface_network.h"
 #include "modeling/tree/centerline_tree.h"
 
@@ -23,7 +24,7 @@ struct Model {
   SurfaceNetwork network;
   CenterlineTree tree;
   std::vector<std::string> assumptions;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::vector<FailedPart> failed;
 };
 

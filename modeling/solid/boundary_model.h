@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/warning.h"
 #include "kernel/evaluate/curvature.h"
 #include "kernel/spline/curve.h"
 #include "kernel/spline/surface.h"
@@ -85,7 +86,7 @@ struct BoundaryModel {
   int shells = 0;
   std::vector<int> shell_solids;  // the solid of each shell, or -1
   bool is_sound = true;           // no defect was found on the way here
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 
   // Given when some face has `mesh`: then all have, on these points.
   Points3 mesh_points;

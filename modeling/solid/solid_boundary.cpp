@@ -331,9 +331,9 @@ class BoundaryBuilder {
     TopLoc_Location place;
     const Handle(Poly_Triangulation) mesh = BRep_Tool::Triangulation(shape, place);
     if (mesh.IsNull()) {
-      model_.warnings.push_back(face.name +
-                                ": could not be meshed and was not searched for "
-                                "self-intersections");
+      model_.warnings.push_back({WarningCode::kFaceNotSearched,
+                                 face.name + ": could not be meshed and was not searched for "
+                                             "self-intersections"});
       return;
     }
     std::vector<int> number(index(mesh->NbNodes()), -1);

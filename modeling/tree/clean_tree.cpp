@@ -116,9 +116,10 @@ class Cleaner {
     for (CenterlineBranch& branch : tree_.branches) {
       if (const int points = put_in_order(branch); points > 0) {
         warnings_.push_back(
-            fmt::format("branch {}: {} points that lead back and forth were taken in the order of "
-                        "the shorter way",
-                        branch.name, points));
+            {WarningCode::kPointsReordered,
+             fmt::format("branch {}: {} points that lead back and forth were taken in the order of "
+                         "the shorter way",
+                         branch.name, points)});
       }
     }
     CleanedTree cleaned{std::move(tree_), {}};
@@ -145,11 +146,13 @@ class Cleaner {
           r.begin(), r.end(), [](double value) { return !(value > 0 && std::isfinite(value)); });
       if (bad == r.end()) continue;
       alive_[b] = false;
-      warnings_.push_back(fmt::format(
-          "branch {} ({} to {}), point {}: radius is not positive: {} (radii are positive and "
-          "finite): left out",
-          branch.name, tree_.nodes[index(branch.from)].name, tree_.nodes[index(branch.to)].name,
-          bad - r.begin(), *bad));
+      warnings_.push_back(
+          {WarningCode::kBadRadius,
+           fmt::format(
+               "branch {} ({} to {}), point {}: radius is not positive: {} (radii are positive and "
+               "finite): left out",
+               branch.name, tree_.nodes[index(branch.from)].name,
+               tree_.nodes[index(branch.to)].name, bad - r.begin(), *bad)});
     }
   }
 
@@ -174,7 +177,8 @@ class Cleaner {
       const int from = find(branch.from);
       const int to = find(branch.to);
       node[index(std::max(from, to))] = std::min(from, to);
-      warnings_.push_back(fmt::format("branch {} has no length: dropped", branch.name));
+      warnings_.push_back({WarningCode::kBranchWithoutLength,
+                           fmt::format("branch {} has no length: dropped", branch.name)});
     }
     for (CenterlineBranch& branch : tree_.branches) {
       branch.from = find(branch.from);
@@ -205,8 +209,9 @@ class Cleaner {
       alive_[index(b)] = false;
       dropped = true;
       warnings_.push_back(
-          fmt::format("branch {} ends inside the lumen it leaves (length {:.3g} mm): dropped",
-                      branch.name, length));
+          {WarningCode::kBranchInsideLumen,
+           fmt::format("branch {} ends inside the lumen it leaves (length {:.3g} mm): dropped",
+                       branch.name, length)});
     }
     return dropped;
   }
@@ -345,7 +350,7 @@ class Cleaner {
   std::vector<bool> alive_;
   std::vector<int> new_node_;
   std::set<std::string> names_;
-  std::vector<std::string> warnings_;
+  std::vector<Warning> warnings_;
 };
 
 }  // namespace

@@ -4,13 +4,14 @@
 #include <string>
 #include <vector>
 
+#include "base/warning.h"
 #include "modeling/tree/centerline_tree.h"
 
 namespace angiospline {
 
 struct CleanedTree {
   CenterlineTree tree;
-  std::vector<std::string> warnings;  // what was dropped, by name
+  std::vector<Warning> warnings;  // what was dropped, by name
 };
 
 // In this order: branches with a radius that is not positive and finite; points that repeat the one

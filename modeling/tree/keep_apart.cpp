@@ -82,11 +82,14 @@ class Separator {
     for (const Overlap& left : find_overlaps(tree_, asked)) {
       const double radius = tree_.tree.branches[index(left.first)].radii_mm.mean();
       if (left.depth_mm <= kWorthNaming * radius) continue;
-      tree_.warnings.push_back(fmt::format(
-          "{} and {} stay too near each other: {:.3g} mm are missing to a clearance of "
-          "{:.3g} radii near ({:.4g}, {:.4g}, {:.4g})",
-          tree_.tree.branches[index(left.first)].name, tree_.tree.branches[index(left.second)].name,
-          left.depth_mm, options_.clearance, left.at_mm.x(), left.at_mm.y(), left.at_mm.z()));
+      tree_.warnings.push_back(
+          {WarningCode::kClearanceMissing,
+           fmt::format(
+               "{} and {} stay too near each other: {:.3g} mm are missing to a clearance of "
+               "{:.3g} radii near ({:.4g}, {:.4g}, {:.4g})",
+               tree_.tree.branches[index(left.first)].name,
+               tree_.tree.branches[index(left.second)].name, left.depth_mm, options_.clearance,
+               left.at_mm.x(), left.at_mm.y(), left.at_mm.z())});
     }
   }
 
@@ -404,14 +407,18 @@ class Separator {
       }
       const std::string& name = tree_.tree.branches[b].name;
       if (moved > kWorthNaming) {
-        tree_.warnings.push_back(fmt::format(
-            "branch {} was moved by up to {:.3g} mm ({:.2g} radii) to keep clear of its "
-            "neighbours",
-            name, moved_mm, moved));
+        tree_.warnings.push_back(
+            {WarningCode::kMovedForClearance,
+             fmt::format(
+                 "branch {} was moved by up to {:.3g} mm ({:.2g} radii) to keep clear of its "
+                 "neighbours",
+                 name, moved_mm, moved)});
       }
       if (kept < 1 - kWorthNaming) {
-        tree_.warnings.push_back(fmt::format(
-            "branch {} was thinned to {:.0f} % to keep clear of its neighbours", name, 100 * kept));
+        tree_.warnings.push_back(
+            {WarningCode::kThinnedForClearance,
+             fmt::format("branch {} was thinned to {:.0f} % to keep clear of its neighbours", name,
+                         100 * kept)});
       }
     }
     // Ends may have moved.

@@ -80,11 +80,12 @@ void warn_of_overlaps(SmoothedTree& tree) {
   const std::vector<Overlap> overlaps = find_overlaps(tree);
   const std::size_t named = std::min(overlaps.size(), kNamedOverlaps);
   for (std::size_t k = 0; k < named; ++k) {
-    tree.warnings.push_back(overlap_text(tree, overlaps[k]));
+    tree.warnings.push_back({WarningCode::kVesselsOverlap, overlap_text(tree, overlaps[k])});
   }
   if (overlaps.size() > named) {
     tree.warnings.push_back(
-        fmt::format("{} more pairs of branches overlap", overlaps.size() - named));
+        {WarningCode::kVesselsOverlap,
+         fmt::format("{} more pairs of branches overlap", overlaps.size() - named)});
   }
 }
 
@@ -107,8 +108,8 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
           return !(b.radii_mm.allFinite() && b.radii_mm.minCoeff() > 0);
         });
     if (without_radius != tree.branches.end()) {
-      return fail({ErrorKind::kBadInput, "no branch is left", tree.source, result.warnings.front(),
-                   "branches have positive radii and a length"});
+      return fail({ErrorKind::kBadInput, "no branch is left", tree.source,
+                   result.warnings.front().text, "branches have positive radii and a length"});
     }
     return fail({ErrorKind::kBadInput,
                  "no branch has a positive length",
@@ -137,7 +138,8 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
   if (!for_each_branch(0.0, [&](std::size_t b) {
         const auto end_at = [&](int node) {
           const bool is_junction = at[index(node)].size() > 2;
-          return SmootherEnd{is_junction, is_junction ? kHidden * radii[index(node)].thickest : 0.0};
+          return SmootherEnd{is_junction,
+                             is_junction ? kHidden * radii[index(node)].thickest : 0.0};
         };
         smoothers[b].emplace(branches[b], end_at(branches[b].from), end_at(branches[b].to),
                              tree_radius, smoothing);
@@ -167,16 +169,18 @@ Result<SmoothedTree> smooth_centerlines(const CenterlineTree& tree, const Smooth
     branches[b].points_mm.rightCols(1) = result.tree.nodes[index(branches[b].to)].position_mm;
     result.largest_move_mm = std::max(result.largest_move_mm, paths[b]->largest_move_mm);
     if (paths[b]->radius_reduced_to < kWorthNaming) {
-      result.warnings.push_back(fmt::format(
-          "branch {} bends more sharply than its radius allows: radius reduced to {:.0f} % there",
-          branches[b].name, 100 * paths[b]->radius_reduced_to));
+      result.warnings.push_back({WarningCode::kRadiusReducedInBend,
+                                 fmt::format("branch {} bends more sharply than its radius allows: "
+                                             "radius reduced to {:.0f} % there",
+                                             branches[b].name, 100 * paths[b]->radius_reduced_to)});
     }
     if (paths[b]->sharpest_bend > 1.0) {
       result.warnings.push_back(
-          fmt::format("branch {} bends more sharply than its radius allows (curvature times radius "
-                      "{:.2g}): its "
-                      "wall may fold there",
-                      branches[b].name, paths[b]->sharpest_bend));
+          {WarningCode::kBendTooSharp,
+           fmt::format(
+               "branch {} bends more sharply than its radius allows (curvature times radius "
+               "{:.2g}): its wall may fold there",
+               branches[b].name, paths[b]->sharpest_bend)});
     }
     if (!paths[b]->path.control_points().allFinite()) {
       return fail({ErrorKind::kBadInput,

@@ -6,6 +6,7 @@
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "base/warning.h"
 #include "kernel/spline/curve.h"
 #include "modeling/tree/centerline_tree.h"
 
@@ -24,7 +25,7 @@ struct SmoothedTree {
   std::vector<BSplineCurve<4>> paths;
 
   double largest_move_mm = 0.0;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 
   // What has become of the input's points can be told from these: the points of each branch (x, y,
   // z, radius) before anything was moved; empty: as in `tree`. And the paths before vessels were

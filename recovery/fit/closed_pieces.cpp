@@ -122,8 +122,9 @@ Result<void> add_closed_pieces(Model& model, const Mask& pieces, const Image<flo
     if (fitted) {
       *closed = std::move(fitted->model);
     } else {
-      closed->warnings.push_back("closed pieces were not fitted to the image: " +
-                                 fitted.error().message());
+      closed->warnings.push_back(
+          {WarningCode::kClosedPiecesNotFitted,
+           "closed pieces were not fitted to the image: " + fitted.error().message()});
     }
   }
   append(model.network, closed->network);

@@ -311,7 +311,8 @@ SurfaceNetwork with_quartered(const SurfaceNetwork& network, const std::vector<i
   }
   for (const auto& [p, q] : quarter) {
     for (int k = 0; k < 2; ++k) {
-      finer.joins.push_back({{q[index(k)], PatchSide::kU1}, {q[index(2 + k)], PatchSide::kU0}, false});
+      finer.joins.push_back(
+          {{q[index(k)], PatchSide::kU1}, {q[index(2 + k)], PatchSide::kU0}, false});
       finer.joins.push_back(
           {{q[index(2 * k)], PatchSide::kV1}, {q[index(2 * k + 1)], PatchSide::kV0}, false});
     }
@@ -366,8 +367,9 @@ Result<Model> closed_model(const Mask& mask) {
                  fmt::format("a piece has at least {} voxels", kFewestClosedVoxels)});
   }
   if (small > 0) {
-    model.warnings.push_back(fmt::format("{} pieces of the mask below {} voxels were left out",
-                                         small, kFewestClosedVoxels));
+    model.warnings.push_back({WarningCode::kPiecesLeftOut,
+                              fmt::format("{} pieces of the mask below {} voxels were left out",
+                                          small, kFewestClosedVoxels)});
   }
   return model;
 }

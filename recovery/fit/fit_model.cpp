@@ -113,11 +113,13 @@ class Fitter {
     }
     for (const std::string& name : fitted.report.without_edge) {
       fitted.model.warnings.push_back(
-          fmt::format("no wall found in the image near {}: it was left as it was", name));
+          {WarningCode::kNoWallInImage,
+           fmt::format("no wall found in the image near {}: it was left as it was", name)});
     }
     for (const HeldRegion& held : fitted.report.held) {
       fitted.model.warnings.push_back(
-          fmt::format("{} was not refined to the image: {}", held.name, held.why));
+          {WarningCode::kRegionNotRefined,
+           fmt::format("{} was not refined to the image: {}", held.name, held.why)});
     }
     fitted.report.control_points_before_reduction =
         static_cast<int>(network.control_points_mm.cols());

@@ -64,7 +64,8 @@ TEST(SeedUnits, TheSameTreeInEveryUnitGivesTheSameModelAndTheSameReport) {
   const Json mm = run_in("mm", 1);
   for (const auto& [unit, scale] : {std::pair{"m", 1e-3}, {"cm", 0.1}, {"um", 1e3}}) {
     const Json other = run_in(unit, scale);
-    for (const char* key : {"branches", "junctions", "loops", "failed", "warnings"}) {
+    for (const char* key :
+         {"branches", "junctions", "loops", "failed", "warnings", "warning_codes"}) {
       EXPECT_EQ(other[key], mm[key]) << unit << ": " << key;
     }
     for (const char* key : {"closed", "valid", "solids", "self_intersecting", "genus"}) {

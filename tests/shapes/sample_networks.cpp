@@ -267,7 +267,8 @@ Model model_of(SurfaceNetwork network) {
   model.tree.assumptions = {"lengths are millimetres"};
   model.tree.source = "a.swc";
   model.assumptions = {"column 6 is the radius"};
-  model.warnings = {"branch b is short"};
+  model.warnings = {{WarningCode::kBranchInsideLumen, "branch b is short"},
+                    {WarningCode::kUnspecified, "told by a file without codes"}};
   model.failed = {{"junction_7", "two branches in the same direction"}};
   return model;
 }

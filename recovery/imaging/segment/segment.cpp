@@ -85,7 +85,8 @@ Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
       report.choices.push_back(fmt::format("background threshold {:.4g}", *grow.background));
   } else {
     report.warnings.push_back(
-        "no contrast was found around the seeds: the rule of growing is the plain one");
+        {WarningCode::kNoContrastAtSeeds,
+         "no contrast was found around the seeds: the rule of growing is the plain one"});
   }
   if (options.neighbourhood_vox) grow.neighbourhood_vox = *options.neighbourhood_vox;
   if (options.deviations) grow.deviations = *options.deviations;
@@ -124,7 +125,8 @@ Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, Se
   report.grown = std::move(grown->report);
   if (report.grown.limit_reached && options.max_examined == most_examined)
     report.warnings.push_back(
-        fmt::format("growing stopped after {} voxels examined", report.grown.examined));
+        {WarningCode::kGrowingStopped,
+         fmt::format("growing stopped after {} voxels examined", report.grown.examined)});
   Filled holes = fill_holes(std::move(grown->mask), options.largest_hole_vox);
   Filled cavities = fill_cavities(std::move(holes.mask));
   Result<ClosedTunnels> closed = close_tunnels(std::move(cavities.mask), {}, progress);
@@ -277,7 +279,7 @@ Result<Attempt> without_swelling(const AnyImage& image, SegmentOptions options, 
     whole.loops = topology.cycles;
     whole.report.components = static_cast<std::size_t>(topology.components);
   }
-  whole.report.warnings.push_back(swelling_text(parts->swelling));
+  whole.report.warnings.push_back({WarningCode::kSwelling, swelling_text(parts->swelling)});
   whole.report.swelling = parts->swelling;
   return whole;
 }
@@ -312,7 +314,7 @@ Result<Segmented> segment(const AnyImage& image, const SegmentOptions& options,
     done = without_leak(image, options, std::move(*done), report.choices, progress);
   if (!done) return fail(done.error());
   if (done->leaks())
-    done->report.warnings.push_back(leak_warning(*done));
+    done->report.warnings.push_back({WarningCode::kProbableLeak, leak_warning(*done)});
   else
     done = without_swelling(image, options, std::move(*done), progress);
   if (!done) return fail(done.error());

@@ -8,6 +8,7 @@
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "base/warning.h"
 #include "recovery/imaging/image/any_image.h"
 #include "recovery/imaging/mask/swelling.h"
 #include "recovery/imaging/segment/region_growing.h"
@@ -48,10 +49,10 @@ struct SegmentReport {
   double deviations = 0;
   double background = 0;
   std::size_t filled_voxels = 0;
-  std::size_t components = 0;         // 26-connected
-  std::optional<Swelling> swelling;   // behind the neck where the front found most
-  std::vector<std::string> choices;   // what was chosen, and from what: one sentence each
-  std::vector<std::string> warnings;  // leaks, limits
+  std::size_t components = 0;        // 26-connected
+  std::optional<Swelling> swelling;  // behind the neck where the front found most
+  std::vector<std::string> choices;  // what was chosen, and from what: one sentence each
+  std::vector<Warning> warnings;     // leaks, limits
 };
 
 struct Segmented {

@@ -216,15 +216,19 @@ Result<DeformedModel> deform_model(const Model& model, const Image<float>& image
   for (const SmoothedPart& part : smooth->parts) {
     if (part.outcome != SmoothedPart::Outcome::kRefused) continue;
     result.model.warnings.push_back(
-        fmt::format("{} could not be made smooth after the deformation: {}", part.name, part.why));
+        {WarningCode::kPartNotSmoothed,
+         fmt::format("{} could not be made smooth after the deformation: {}", part.name,
+                     part.why)});
   }
   for (const std::string& name : result.without_edge) {
     result.model.warnings.push_back(
-        fmt::format("no edge found in the image near {}: it was left as it was", name));
+        {WarningCode::kNoEdgeInImage,
+         fmt::format("no edge found in the image near {}: it was left as it was", name)});
   }
   if (result.report.termination != Termination::kAtRest) {
-    result.model.warnings.push_back(fmt::format("the deformation did not come to rest: {}",
-                                                to_string(result.report.termination)));
+    result.model.warnings.push_back(
+        {WarningCode::kDeformationNotAtRest, fmt::format("the deformation did not come to rest: {}",
+                                                         to_string(result.report.termination))});
   }
   return result;
 }

@@ -171,9 +171,9 @@ TEST_F(MeshFiles, OfVeryLargeModelsAreCoarserByDefaultAndSaidToBe) {
   const auto coarse = export_model(model, paths, options);
   ASSERT_TRUE(coarse) << coarse.error().message();
   ASSERT_EQ(coarse->warnings.size(), 1U);  // one mesh, two files
-  EXPECT_NE(coarse->warnings[0].find("instead of 0.01, so that there are at most 400"),
+  EXPECT_NE(coarse->warnings[0].text.find("instead of 0.01, so that there are at most 400"),
             std::string::npos)
-      << coarse->warnings[0];
+      << coarse->warnings[0].text;
   EXPECT_LT(fs::file_size(paths[0]), bytes);
 
   options.tessellation.coarsen = false;

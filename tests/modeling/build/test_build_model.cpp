@@ -126,7 +126,7 @@ TEST(SeedModel, ATightBendKeepsItsCourseAndItsVolume) {
     const TreeMaker maker = siphon(radius, bend * radius, 12);
     const Result<Model> model = build_model(maker.tree);
     ASSERT_TRUE(model) << model.error().message();
-    for (const std::string& text : model->warnings) {
+    for (const std::string& text : texts_of(model->warnings)) {
       EXPECT_EQ(text.find("leaves its centerline"), std::string::npos) << text;
     }
     const double length = 24 + kPi * bend * radius;
@@ -309,7 +309,7 @@ TEST(SeedModel, JunctionsTooNearEachOtherBecomeOneAndSaySo) {
   EXPECT_TRUE(model->failed.empty());
   EXPECT_TRUE(region_names(model->network).contains("junction_a+b"));
   EXPECT_TRUE(std::any_of(model->warnings.begin(), model->warnings.end(), [](const auto& w) {
-    return w.find("a and b became one") != std::string::npos;
+    return w.text.find("a and b became one") != std::string::npos;
   }));
   EXPECT_EQ(model->network.rims.size(), 4u);
   expect_smooth(model->network);
@@ -396,22 +396,23 @@ TEST(RoomMaker, CutsAJunctionWhereTheLeastIsLackingAndThinsVesselsThere) {
     if (!any) continue;
     ++thinned;
     const std::string start = "branch " + tree.tree.branches[b].name + " was thinned";
-    EXPECT_TRUE(std::any_of(made.warnings.begin(), made.warnings.end(), [&](const auto& text) {
-      return text.rfind(start, 0) == 0;
+    EXPECT_TRUE(std::any_of(made.warnings.begin(), made.warnings.end(), [&](const auto& warning) {
+      return warning.text.rfind(start, 0) == 0;
     })) << start;
   }
   EXPECT_GT(thinned, 0);
 }
 
 TEST(SeedModel, ACrowdedTrunkIsOneNetworkAndSaysWhatWasThinned) {
-  const Result<BuiltModel> seeded = build_with_room(smooth_centerlines(crowded_trunk(10).tree).value());
+  const Result<BuiltModel> seeded =
+      build_with_room(smooth_centerlines(crowded_trunk(10).tree).value());
   ASSERT_TRUE(seeded) << seeded.error().message();
   EXPECT_TRUE(seeded->model.failed.empty());
   EXPECT_EQ(seeded->model.network.rims.size(), 12U);
   expect_smooth(seeded->model.network);
   const auto& warnings = seeded->model.warnings;
-  EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(), [](const std::string& text) {
-    return text.find("was thinned to") != std::string::npos;
+  EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(), [](const Warning& warning) {
+    return warning.text.find("was thinned to") != std::string::npos;
   }));
   // The walls follow the tree as it was thinned.
   const Fidelity f = measure_fidelity(seeded->model.network, seeded->tree);
@@ -441,7 +442,7 @@ void expect_the_rest(const Result<Model>& model, const std::vector<std::string>&
   expect_smooth(model->network);
   std::string said;
   for (const FailedPart& part : model->failed) said += part.name + ": " + part.why + "\n";
-  for (const std::string& text : model->warnings) said += text + "\n";
+  for (const std::string& text : texts_of(model->warnings)) said += text + "\n";
   for (const std::string& text : model->assumptions) said += text + "\n";
   for (const std::string& word : named) {
     EXPECT_NE(said.find(word), std::string::npos) << word << " is not in: " << said;
@@ -456,10 +457,10 @@ TEST(SeedModel, TwoBranchesInTheSameDirectionAreNamedAndTheRestIsThere) {
                   {"bad_b"});
 }
 
-std::size_t times_named(const std::vector<std::string>& texts, const std::string& name) {
-  return static_cast<std::size_t>(
-      std::count_if(texts.begin(), texts.end(),
-                    [&](const std::string& text) { return text.find(name) != std::string::npos; }));
+std::size_t times_named(const std::vector<Warning>& warnings, const std::string& name) {
+  return static_cast<std::size_t>(std::count_if(
+      warnings.begin(), warnings.end(),
+      [&](const Warning& warning) { return warning.text.find(name) != std::string::npos; }));
 }
 
 // A tunnel that noise left in a mask at a fork: its way round is no longer than the lumen is wide.

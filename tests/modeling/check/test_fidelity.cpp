@@ -144,7 +144,7 @@ TEST(KeepApart, ThinsWhatMovingAloneCannotPart) {
   for (const Overlap& left : find_overlaps(after, {0.1}))
     ADD_FAILURE() << overlap_text(after, left);
   int named = 0;
-  for (const std::string& text : after.warnings) {
+  for (const std::string& text : texts_of(after.warnings)) {
     named += text.find("was thinned to") != std::string::npos ? 1 : 0;
   }
   EXPECT_EQ(named, 2);

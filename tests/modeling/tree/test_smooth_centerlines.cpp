@@ -198,7 +198,7 @@ TEST(CleanTree, SpursInsideTheLumenGoByNameAndTheirNodeIsJoined) {
   EXPECT_EQ(cleaned.tree.branches[0].name, "0_19");
   EXPECT_EQ(cleaned.tree.branches[0].points_mm.cols(), 20);
   ASSERT_EQ(cleaned.warnings.size(), 1U);
-  EXPECT_NE(cleaned.warnings[0].find("branch 9_22 ends inside the lumen"), std::string::npos);
+  EXPECT_NE(cleaned.warnings[0].text.find("branch 9_22 ends inside the lumen"), std::string::npos);
 }
 
 TEST(CleanTree, ATwigThatLeavesTheLumenStays) {
@@ -229,7 +229,7 @@ TEST(CleanTree, PointsTracedOutOfOrderAreExchangedAndHairpinsAreNot) {
   EXPECT_EQ(zigzag.tree.branches[0].points_mm(2, 2), 4.5);
   EXPECT_EQ(zigzag.tree.branches[0].points_mm(2, 3), 6.0);
   ASSERT_EQ(zigzag.warnings.size(), 1U);
-  EXPECT_NE(zigzag.warnings[0].find("branch 0_5: 2 points"), std::string::npos);
+  EXPECT_NE(zigzag.warnings[0].text.find("branch 0_5: 2 points"), std::string::npos);
   const CleanedTree hairpin =
       of_points({{0, 0, 0}, {0, 0, 3}, {0, 0, 6}, {1.2, 0, 6.2}, {1.5, 0, 3}, {1.5, 0, 0}});
   EXPECT_TRUE(hairpin.warnings.empty());

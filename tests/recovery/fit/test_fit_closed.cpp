@@ -119,7 +119,7 @@ TEST(ClosedModel, HasOneEllipsoidForEachPieceOfAMask) {
   ASSERT_TRUE(model);
   ASSERT_EQ(model->network.regions.size(), 2U);
   ASSERT_EQ(model->warnings.size(), 1U);
-  EXPECT_NE(model->warnings.front().find("1 pieces"), std::string::npos);
+  EXPECT_NE(model->warnings.front().text.find("1 pieces"), std::string::npos);
   const auto mesh = tessellate(model->network);
   const MeshMeasure size = measure(mesh->mesh);
   EXPECT_EQ(size.components, 2);

@@ -204,7 +204,7 @@ TEST(Segment, WarnsOfALeakIntoTissue) {
   ASSERT_TRUE(leaked && sound);
   EXPECT_TRUE(sound->report.warnings.empty());
   ASSERT_EQ(leaked->report.warnings.size(), 1U);
-  EXPECT_NE(leaked->report.warnings[0].find("leaked"), std::string::npos);
+  EXPECT_NE(leaked->report.warnings[0].text.find("leaked"), std::string::npos);
 }
 
 TEST(Segment, RaisesTheThresholdUntilALeakIsShut) {

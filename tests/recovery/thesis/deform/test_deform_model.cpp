@@ -137,7 +137,7 @@ TEST(DeformModel, LeavesABranchWithoutEdgesAsItWasAndSaysWhich) {
   ASSERT_TRUE(result) << result.error().message();
   ASSERT_EQ(result->without_edge, std::vector<std::string>{name});
   int warned = 0;
-  for (const std::string& text : result->model.warnings)
+  for (const std::string& text : texts_of(result->model.warnings))
     warned += text.find("no edge found in the image near " + name) != std::string::npos ? 1 : 0;
   EXPECT_EQ(warned, 1);
   int at_end = 0;
