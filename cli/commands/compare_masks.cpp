@@ -115,7 +115,8 @@ int run_compare_masks(const CompareMasksArguments& arguments) {
   if (!compared) return report_error(compared.error());
   const bool placed_alike = lie_alike(truth->grid, result->grid);
   if (!placed_alike)
-    console.warn("the masks' origins or directions differ; they are compared voxel by voxel");
+    console.warn({WarningCode::kUnspecified,
+                  "the masks' origins or directions differ; they are compared voxel by voxel"});
   result->grid = truth->grid;
   std::optional<CenterlineFigures> lines;
   if (!arguments.no_centerlines && compared->result_voxels > 0) {

@@ -14,7 +14,7 @@ namespace angiospline {
 // max_normal_angle_deg, worst_edge [name, name] (null without a smooth edge), worst_edge_at_mm,
 // min_jacobian_ratio, min_jacobian_face, max_curvature_times_radius and max_curvature_face (null
 // where no radius is known), genus (null unless closed), self_intersections [{faces, at_mm}],
-// self_intersection_resolution_mm, edge_samples, warnings.
+// self_intersection_resolution_mm, edge_samples, warnings, warning_codes.
 nlohmann::json to_json(const Certificate& certificate);
 
 // The same figures as lines a person reads.
