@@ -3,7 +3,7 @@ SHELL := /bin/bash
 JOBS ?= $(shell nproc)
 BUILD := build/release
 
-.PHONY: help install build test demo sanitize clang bench format tidy clean
+.PHONY: help install build test demo sanitize clang bench deb format tidy clean
 
 help:
 	@echo "Angiospline: vessels to CAD."
@@ -14,6 +14,7 @@ help:
 	@echo "  make sanitize  all tests under the address and undefined-behaviour sanitizers"
 	@echo "  make clang     build and test with clang 14"
 	@echo "  make bench     build and run the benchmarks"
+	@echo "  make deb       build the Debian packages: $(BUILD)/packages/"
 	@echo "  make format    clang-format every source file; make tidy: clang-tidy"
 	@echo "  make clean     remove build/ and out/"
 
@@ -41,6 +42,10 @@ clang: install
 
 bench: install
 	@scripts/bench.sh
+
+deb: install
+	@scripts/build.sh release angiospline
+	@cd $(BUILD) && cpack -G DEB
 
 format:
 	@scripts/install_packages.sh scripts/packages-dev.txt
