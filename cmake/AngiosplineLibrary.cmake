@@ -1,9 +1,14 @@
+# What nearly every file includes, parsed once a library. Sources still include what they use: the sanitize
+# preset builds without precompiled headers.
+set(ANGIOSPLINE_PRECOMPILE <algorithm> <array> <cmath> <functional> <limits> <map> <memory> <optional>
+  <string> <utility> <vector> <Eigen/Core> <Eigen/Geometry> <tl/expected.hpp>)
+
 # angiospline_library(<name> ROOMS <folder>... [HEADERS ...] [SOURCES ...] PUBLIC <targets> PRIVATE <targets>)
 # One static library: target angiospline_<name>, alias Angiospline::<name>. Its files lie in rooms, subfolders
 # that each name their own files by angiospline_room(); HEADERS (all public) and SOURCES are for a library
-# without rooms.
+# without rooms. PRECOMPILE: heavy headers that most of its files include, beside those of every library.
 function(angiospline_library name)
-  cmake_parse_arguments(ARG "" "" "ROOMS;HEADERS;SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "ROOMS;HEADERS;SOURCES;PUBLIC;PRIVATE;PRECOMPILE" ${ARGN})
   set(target angiospline_${name})
   add_library(${target} STATIC ${ARG_SOURCES})
   add_library(Angiospline::${name} ALIAS ${target})
@@ -14,6 +19,7 @@ function(angiospline_library name)
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/angiospline>)
   target_link_libraries(${target} PUBLIC ${ARG_PUBLIC}
     PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:angiospline_warnings>)
+  target_precompile_headers(${target} PRIVATE ${ANGIOSPLINE_PRECOMPILE} ${ARG_PRECOMPILE})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
   install(TARGETS ${target} EXPORT AngiosplineTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   angiospline_install_headers(${ARG_HEADERS})
