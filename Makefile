@@ -3,7 +3,7 @@ SHELL := /bin/bash
 JOBS ?= $(shell nproc)
 BUILD := build/release
 
-.PHONY: help install build test demo sanitize clang bench deb format tidy clean
+.PHONY: help install build test judges demo sanitize clang bench deb format tidy clean
 
 help:
 	@echo "Angiospline: vessels to CAD."
@@ -11,6 +11,7 @@ help:
 	@echo "  make demo      install what is missing, build, run the main job on the built-in sample"
 	@echo "  make test      install, build, run all tests"
 	@echo "  make build     install, build: the program is $(BUILD)/cli/angiospline"
+	@echo "  make judges    install gmsh, FreeCAD, Netgen, a browser ... and run all tests with them"
 	@echo "  make sanitize  all tests under the address and undefined-behaviour sanitizers"
 	@echo "  make clang     build and test with clang 14"
 	@echo "  make bench     build and run the benchmarks"
@@ -26,6 +27,10 @@ build: install
 
 test: build
 	@scripts/run_tests.sh release
+
+judges: install
+	@scripts/install_judges.sh
+	@$(MAKE) --no-print-directory test
 
 demo: install
 	@scripts/build.sh release angiospline
