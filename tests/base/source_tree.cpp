@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
+#include <set>
 #include <sstream>
 
 #include "tests/shapes/paths.h"
@@ -96,14 +97,22 @@ Library library_in(const std::string& folder) {
   return library;
 }
 
+std::size_t indent_of(const std::string& line) {
+  return std::min(line.find_first_not_of(' '), line.size());
+}
+
+// Whether a line, indented as the definitions of its namespace or class are, opens a function's
+// body: what clang-format leaves at the end of a signature.
 bool opens_function(const std::string& line, std::size_t indent) {
-  if (line.size() <= indent || line.back() != '{') return false;
-  if (line.find_first_not_of(' ') != indent) return false;
-  static const std::regex kOther(
-      R"(^\s*(namespace|struct|class|enum|union|extern|if|for|while|switch|do|else|try|\}|//|case|default|return)\b?)");
-  if (std::regex_search(line, kOther)) return false;
-  return line.find('=') == std::string::npos || line.find(") ") != std::string::npos ||
-         line.find("operator") != std::string::npos;
+  if (line.empty() || line.back() != '{') return false;
+  const std::string first = line.substr(indent, line.find_first_of(" ({", indent) - indent);
+  static const std::set<std::string> kOther{
+      "namespace", "struct", "class", "enum", "union",  "extern", "if", "for",  "while",
+      "switch",    "do",     "else",  "try",  "return", "}",      "//", "case", ""};
+  if (kOther.contains(first)) return false;
+  // An initialiser in braces is no function.
+  const std::size_t equals = line.find(" = ");
+  return equals == std::string::npos || line.find('(') < equals;
 }
 
 }  // namespace
@@ -145,19 +154,28 @@ std::vector<Function> functions() {
   for (const File& file : files()) {
     const auto& lines = file.lines;
     for (std::size_t i = 0; i < lines.size(); ++i) {
-      const std::size_t indent = lines[i].find_first_not_of(' ');
-      if (indent > 2 || indent == std::string::npos || !opens_function(lines[i], indent)) continue;
-      // A signature over several lines opens on a deeper line; clang-format ends it at this depth.
+      if (lines[i].empty() || lines[i].back() != '{') continue;
+
+      // A signature over several lines starts at the last line that is indented as a definition is.
+      std::size_t first = i;
+      while (first > 0 && indent_of(lines[first]) > 2) --first;
+      const std::size_t indent = indent_of(lines[first]);
+      std::string signature;
+      for (std::size_t k = first; k <= i; ++k)
+        signature += lines[k].substr(k == first ? 0 : indent);
+      const bool whole = signature.find(';') == std::string::npos;
+      if (indent > 2 || !whole || !opens_function(signature, indent)) continue;
+
       const std::string closing = std::string(indent, ' ') + "}";
       std::size_t end = i + 1;
-      Function function{file.path, static_cast<int>(i) + 1, 0, 0, false};
+      Function function{file.path, static_cast<int>(first) + 1, 0, 0, false};
       while (end < lines.size() && lines[end] != closing) {
         function.blank_lines += lines[end].empty() ? 1 : 0;
         ++end;
       }
       if (end == lines.size()) continue;
-      function.lines = static_cast<int>(end - i + 1);
-      function.has_reason = i > 0 && lines[i - 1].find("Long: ") != std::string::npos;
+      function.lines = static_cast<int>(end - first + 1);
+      function.has_reason = first > 0 && lines[first - 1].find("Long: ") != std::string::npos;
       result.push_back(function);
       i = end;
     }

@@ -45,7 +45,7 @@ const std::map<std::string, Library>& libraries();
 struct Function {
   std::string file;
   int line = 0;   // of its first line, from 1
-  int lines = 0;  // from the signature's last line to its closing brace
+  int lines = 0;  // from its first line to its closing brace
   int blank_lines = 0;
   bool has_reason = false;  // a comment "long: ..." stands right above it
 };
