@@ -64,10 +64,10 @@ CenterlineTree straight_tree(const std::vector<Vec3>& nodes,
                              const std::vector<double>& radii_mm) {
   CenterlineTree tree;
   for (std::size_t n = 0; n < nodes.size(); ++n)
-    tree.nodes.push_back({"n" + std::to_string(n), nodes[n]});
+    tree.nodes.push_back({std::string("n").append(std::to_string(n)), nodes[n]});
   for (std::size_t b = 0; b < branches.size(); ++b) {
     const auto& [from, to] = branches[b];
-    CenterlineBranch branch{"b" + std::to_string(b), from, to, Points3(3, 9),
+    CenterlineBranch branch{std::string("b").append(std::to_string(b)), from, to, Points3(3, 9),
                             Eigen::VectorXd::Constant(9, radii_mm[b])};
     for (int k = 0; k < 9; ++k)
       branch.points_mm.col(k) =
