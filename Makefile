@@ -3,7 +3,7 @@ SHELL := /bin/bash
 JOBS ?= $(shell nproc)
 BUILD := build/release
 
-.PHONY: help install build test judges demo sanitize clang bench deb format tidy clean
+.PHONY: help install build test judges demo sanitize clang bench deb format tidy docs gallery clean
 
 help:
 	@echo "Angiospline: vessels to CAD."
@@ -17,6 +17,8 @@ help:
 	@echo "  make bench     build and run the benchmarks"
 	@echo "  make deb       build the Debian packages: $(BUILD)/packages/"
 	@echo "  make format    clang-format every source file; make tidy: clang-tidy"
+	@echo "  make docs      the API reference: build/docs/html/index.html"
+	@echo "  make gallery   the pictures of docs/gallery.md, from the program's output"
 	@echo "  make clean     remove build/ and out/"
 
 install:
@@ -55,10 +57,19 @@ deb: install
 format:
 	@scripts/install_packages.sh scripts/packages-dev.txt
 	@git ls-files '*.h' '*.cpp' | xargs clang-format-14 -i
+	@git ls-files '*.md' | xargs /usr/bin/python3 scripts/wrap_markdown.py
 
 tidy: build
 	@scripts/install_packages.sh scripts/packages-dev.txt
 	@git ls-files '*.cpp' | grep -v '^tests/\|^benches/' | xargs -P $(JOBS) -n 4 clang-tidy-14 --quiet -p $(BUILD)
+
+docs:
+	@scripts/install_packages.sh scripts/packages-dev.txt
+	@scripts/make_api_docs.sh build/docs
+
+gallery: build
+	@scripts/install_packages.sh scripts/packages-dev.txt
+	@/usr/bin/python3 scripts/make_gallery.py $(BUILD)/cli/angiospline docs/images
 
 clean:
 	rm -rf build out
