@@ -28,8 +28,8 @@ MovedPatches move_junction(const SurfaceNetwork& network, const std::vector<Stri
                            const std::map<int, Vec3>& openings,
                            const std::vector<PatchSample>& samples);
 
-// The same for a closed surface of Bezier patches (modeling/closed_surface.h): no openings, every
-// point is free.
+// The same for a closed surface of Bezier patches (recovery/fit/closed_surface.h): no openings,
+// every point is free.
 MovedPatches move_closed(const SurfaceNetwork& network, const std::vector<int>& patches,
                          double radius_mm, const std::vector<PatchSample>& samples);
 
