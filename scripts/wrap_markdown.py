@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Wraps the paragraphs and list items of markdown files at 120 columns, in place.
 
-Headings, tables, code blocks, block quotes, HTML and indented blocks stay as they are. Part of `make format`.
+Front matter, headings, tables, code blocks, block quotes, HTML and indented blocks stay as they are. Part of `make format`.
 """
 import re
 import sys
@@ -46,7 +46,11 @@ def wrap(text):
         paragraph.clear()
 
     lines = text.split("\n")
+    front_matter = lines.index("---", 1) if lines[0] == "---" and "---" in lines[1:] else -1
     for k, line in enumerate(lines):
+        if k <= front_matter:
+            out.append(line)
+            continue
         fence = line.lstrip().startswith("```")
         if fence or fenced or in_comment or "<!--" in line:
             flush()

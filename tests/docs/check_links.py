@@ -138,7 +138,7 @@ class Checker:
                 self.check_link(page, number, target)
             for span in SPAN.findall(line):
                 self.check_span(page, number, span)
-            if len(line) > WIDTH and line[0] != "|" and " " in line[:WIDTH].strip() and "](" not in line[WIDTH - 60:]:
+            if len(line) > WIDTH and line[0] != "|" and not line.startswith("    ") and " " in line[:WIDTH].strip() and "](" not in line[WIDTH - 60:]:
                 self.report(page, number, f"{len(line)} columns, {WIDTH} at most: scripts/wrap_markdown.py")
 
     def check_comments(self, source):
