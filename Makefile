@@ -3,7 +3,7 @@ SHELL := /bin/bash
 JOBS ?= $(shell nproc)
 BUILD := build/release
 
-.PHONY: help install build test judges demo sanitize clang bench deb format tidy docs gallery clean
+.PHONY: help install build test judges demo sanitize odr clang bench deb format tidy docs gallery clean
 
 help:
 	@echo "Angiospline: vessels to CAD."
@@ -13,6 +13,7 @@ help:
 	@echo "  make build     install, build: the program is $(BUILD)/cli/angiospline"
 	@echo "  make judges    install gmsh, FreeCAD, Netgen, a browser ... and run all tests with them"
 	@echo "  make sanitize  all tests under the address and undefined-behaviour sanitizers"
+	@echo "  make odr       links with an error where one name is defined in two ways"
 	@echo "  make clang     build and test with clang 14"
 	@echo "  make bench     build and run the benchmarks"
 	@echo "  make deb       build the Debian packages: $(BUILD)/packages/"
@@ -41,6 +42,9 @@ demo: install
 sanitize: install
 	@scripts/build.sh sanitize
 	@scripts/run_tests.sh sanitize
+
+odr: install
+	@scripts/build.sh odr angiospline
 
 clang: install
 	@scripts/install_packages.sh scripts/packages-dev.txt
