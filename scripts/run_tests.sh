@@ -12,12 +12,12 @@ modules=$PWD/build/judges/node_modules
 if [ -z "${ANGIOSPLINE_NODE_MODULES:-}" ] && [ -d "$modules/gltf-validator" ]; then export ANGIOSPLINE_NODE_MODULES=$modules; fi
 if [ -z "${ANGIOSPLINE_CHROMIUM:-}" ] && command -v chromium >/dev/null; then export ANGIOSPLINE_CHROMIUM=chromium; fi
 missing=()
-for judge in gmsh freecadcmd netgen; do command -v "$judge" >/dev/null || missing+=("$judge"); done
+for judge in gmsh freecadcmd netgen doxygen; do command -v "$judge" >/dev/null || missing+=("$judge"); done
 [ -n "${ANGIOSPLINE_NODE_MODULES:-}" ] || missing+=(gltf-validator)
 [ -n "${ANGIOSPLINE_CHROMIUM:-}" ] || missing+=(chromium)
 if [ ${#missing[@]} -gt 0 ]; then
   echo "Tests with these outside judges are skipped: ${missing[*]} (make judges installs them)" >&2
 else
-  echo "All outside judges are here: gmsh, FreeCAD, Netgen, the Khronos validator, a browser" >&2
+  echo "All outside judges are here: gmsh, FreeCAD, Netgen, the Khronos validator, a browser, Doxygen" >&2
 fi
 exec ctest --preset "$1" --parallel "${JOBS:-$(nproc)}"

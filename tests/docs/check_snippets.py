@@ -8,7 +8,8 @@ Every block of a page marked `sh` runs, in the page's order, in one temporary fo
 what it prints: every line must come, in this order. In such a line `...` stands for anything, a line `...` for any
 lines, and times (`0.4 s`) are not compared.
 
-A block behind the comment <!-- not run: REASON --> does not run; it is counted and its reason printed.
+A block behind the comment <!-- not run: REASON --> does not run; it is counted and its reason printed. One behind
+<!-- needs: PROGRAM --> runs where that program is installed, and is counted likewise where it is not.
 A block marked `cpp` with a main function must be, character by character, a file of tests/package/client, which the
 package's test compiles and runs.
 """
@@ -20,7 +21,7 @@ import subprocess
 import sys
 import tempfile
 
-NOT_RUN = re.compile(r"<!--\s*not run:\s*(.*?)\s*-->\s*$")
+NOT_RUN = re.compile(r"<!--\s*(not run|needs):\s*(.*?)\s*-->\s*$")
 TIME = re.compile(r"\b\d+(?:\.\d+)?(?:e-?\d+)? ?m?s\b")
 
 
@@ -29,6 +30,13 @@ class Block:
         self.language, self.line, self.reason = language, line, reason
         self.text = ""
         self.follows = None  # the block right in front, only blank lines between
+
+
+def reason_of(mark):
+    """Why a marked block does not run here, or None."""
+    if mark.group(1) == "not run":
+        return mark.group(2)
+    return None if shutil.which(mark.group(2)) else f"needs {mark.group(2)}, which is not installed"
 
 
 def blocks(page_text):
@@ -47,7 +55,7 @@ def blocks(page_text):
             between += line
             marked = NOT_RUN.search(line)
             if marked or line.strip():
-                reason = marked.group(1) if marked else None
+                reason = reason_of(marked) if marked else None
     return found
 
 

@@ -84,6 +84,12 @@ class Snippets(Project):
         wrong, counts, reasons = self.check("<!-- not run: needs a reason -->\n```sh\nfalse\n```\n")
         self.assertEqual((wrong, counts["run"], len(reasons)), ([], 0, 1))
 
+    def test_a_block_that_needs_a_program_runs_where_it_is(self):
+        wrong, counts, reasons = self.check("<!-- needs: bash -->\n```sh\nfalse\n```\n")
+        self.assertEqual((len(wrong), counts["run"], len(reasons)), (1, 1, 0))
+        wrong, counts, reasons = self.check("<!-- needs: no_such_program -->\n```sh\nfalse\n```\n")
+        self.assertEqual((len(wrong), counts["run"], len(reasons)), (0, 0, 1))
+
     def test_a_mark_serves_one_block(self):
         self.assertEqual(len(self.check("<!-- not run: why -->\n```sh\nfalse\n```\n\n```sh\nfalse\n```\n")[0]), 1)
 
