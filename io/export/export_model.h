@@ -54,7 +54,7 @@ Result<ExportReport> export_model(const Model& model,
                                   const ExportOptions& options = {}, const Progress& progress = {},
                                   const std::function<void()>& meanwhile = {});
 
-// The same for a solid by anyone, to every format but the native one.
+// The same for a solid from any source, to every format but the native one.
 Result<void> export_solid(const Solid& solid, const std::string& name,
                           const std::vector<std::filesystem::path>& paths,
                           const ExportOptions& options = {}, const Progress& progress = {});

@@ -62,7 +62,7 @@ struct Certificate {
   std::vector<Warning> warnings;
 };
 
-// The certificate of a solid by anyone. Normals and gaps are sampled on every shared edge, corners
+// The certificate of any solid. Normals and gaps are sampled on every shared edge, corners
 // included, at the parameters of both faces; polynomial faces that are whole patches have volume
 // and area by Gauss's rule (the volume exactly), others by adaptive quadrature (1e-9, relative).
 // Linear in the number of knot spans. Errors: stopped on request; OpenCASCADE failed.

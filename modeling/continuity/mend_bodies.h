@@ -19,10 +19,10 @@ std::vector<BodyRing> body_rings(const SurfaceNetwork& network);
 
 // Moves control points of the ring so that the laws of Body hold again, each by the shortest way:
 //   rims lie in their planes;
-//   corners of the openings it joins come to lie half way between their neighbours;
+//   corners of the openings it joins move to half way between their neighbours;
 //   the rows beside a joined end go along one direction, the mean of both sides', the body's by an
 //   affine multiple of it; and
-//   seam points come to lie between their neighbours, in the ratio they have at the joined end.
+//   seam points move to between their neighbours, in the ratio they have at the joined end.
 // What is held: all else, and dependent points follow their masters. With these laws the normals
 // agree exactly along all seams and joined ends; the patches beyond an opening are not looked at
 // otherwise. Returns the regions beyond its ends whose control points moved.

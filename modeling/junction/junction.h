@@ -65,7 +65,7 @@ struct JunctionOptions {
   int settings = 16;       // of the solve that are tried, at most
 };
 
-// How far from the centre each branch's opening comes to lie, in mm; the order
+// How far from the centre each branch's opening lies, in mm; the order
 // of the spec. Errors: fewer than three branches or more than 24, a radius that
 // is not positive and finite, two branches in the same direction; each names
 // the junction and the branches.

@@ -1,4 +1,4 @@
-// A solid by anyone as a boundary model to measure.
+// A solid from any source as a boundary model to measure.
 #pragma once
 
 #include "base/progress.h"

@@ -1,4 +1,4 @@
-// A solid by anyone as a triangle mesh with named parts.
+// A solid from any source as a triangle mesh with named parts.
 #pragma once
 
 #include "base/progress.h"

@@ -166,7 +166,7 @@ class Separator {
     }
   }
 
-  // Where one of the file's points has come to lie too far away all the same, between control
+  // Where one of the file's points is too far away all the same, between control
   // points, part of the way is given back. False if there is none.
   bool give_back() {
     std::vector<char> changed(tree_.paths.size(), 0);

@@ -1,4 +1,4 @@
-// Takes from a tree's numbers what only tells of the unit they were written in.
+// Rounds the numbers of a tree so that its model does not depend on the unit they were written in.
 #pragma once
 
 #include "modeling/tree/centerline_tree.h"

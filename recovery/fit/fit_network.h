@@ -1,4 +1,4 @@
-// A surface network moved to where a mesh of its wall has come to lie, tangent planes kept.
+// A surface network moved to where a mesh of its wall has moved, tangent planes kept.
 #pragma once
 
 #include <string>

@@ -14,7 +14,7 @@ namespace angiospline {
 inline constexpr int kPatchSize = 6;
 inline constexpr int kPatchPoints = kPatchSize * kPatchSize;
 
-// A place of the group's surface and where it should come to lie.
+// A place of the group's surface and where it should lie.
 struct PatchSample {
   int patch = -1;  // of the network
   Vec2 uv = Vec2::Zero();
