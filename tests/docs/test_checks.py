@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """The checks of the documentation find what they look for: each is shown a page with that mistake."""
 import os
+import shutil
 import stat
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -96,6 +98,24 @@ class Snippets(Project):
     def test_a_program_that_nobody_compiles_is_found(self):
         self.assertEqual(self.check("```cpp\nint main() {}\n```\n")[0], [])
         self.assertEqual(len(self.check("```cpp\nint main() { }\n```\n")[0]), 1)
+
+
+@unittest.skipUnless(shutil.which("c++"), "no compiler")
+class Examples(Project):
+    def exit_code(self, page):
+        self.write("docs/page.md", page)
+        check = os.path.join(os.path.dirname(os.path.abspath(__file__)), "check_examples.py")
+        return subprocess.run([sys.executable, check, "--root", self.root, "--compiler", "c++", "docs/page.md"],
+                              stdout=subprocess.DEVNULL, check=False).returncode
+
+    def test_an_example_sees_its_own_header_and_the_projects(self):
+        self.assertEqual(self.exit_code("<!-- file: room/a.h -->\n```cpp\nint f(int x);\n```\nand\n"
+                                        "<!-- file: room/a.cpp -->\n```cpp\n#include \"room/a.h\"\n"
+                                        "#include \"kernel/room/there.h\"\nint f(int x) { return x; }\n```\n"), 0)
+
+    def test_an_example_that_does_not_compile_or_is_not_there_is_found(self):
+        self.assertNotEqual(self.exit_code("<!-- file: a.cpp -->\n```cpp\nint f() { return g(); }\n```\n"), 0)
+        self.assertNotEqual(self.exit_code("Nothing.\n"), 0)
 
 
 if __name__ == "__main__":
