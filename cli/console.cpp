@@ -98,6 +98,8 @@ void Console::warn(const Warning& warning) const {
   say(fmt::format("warning [{}]: {}", name_of(warning.code), warning.text));
 }
 
+void print_json(std::string_view text) { fmt::print("{}\n", text); }
+
 int report_error(const Error& error) {
   fmt::print(stderr, "angiospline: {}\n", error.message());
   switch (error.kind) {

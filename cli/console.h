@@ -35,6 +35,9 @@ class Console {
   std::shared_ptr<State> state_;
 };
 
+// Prints one JSON object on standard output.
+void print_json(std::string_view text);
+
 // Prints the error as one line on stderr and returns the exit code of its kind.
 int report_error(const Error& error);
 

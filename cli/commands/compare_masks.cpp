@@ -1,16 +1,29 @@
 #include "recovery/analysis/compare_masks.h"
 
+#include <memory>
 #include <optional>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/console.h"
-#include "cli/figures.h"
+#include "cli/options.h"
+#include "pipeline/segment_file.h"
 #include "recovery/analysis/compare_centerlines.h"
+#include "recovery/centerlines/vessels_from_mask.h"
 
 namespace angiospline::cli {
 namespace {
+
+struct Arguments {
+  std::filesystem::path truth;
+  std::filesystem::path result;
+  bool level_set = false;   // `truth` is a level set, negative inside
+  bool within_box = false;  // what lies beyond the bounding box of the truth does not count
+  bool no_centerlines = false;
+  bool json = false;
+};
 
 struct CenterlineFigures {
   CenterlineOverlap overlap;
@@ -26,12 +39,6 @@ Result<CenterlineFigures> compare_centerlines(const Mask& truth, const Mask& res
   return CenterlineFigures{
       centerline_overlap(true_vessels->tree, vessels->tree),
       centerline_dice(truth, true_vessels->skeleton, result, vessels->skeleton)};
-}
-
-Result<Mask> read_mask(const std::string& path, bool level_set, const Progress& progress) {
-  const auto file = read_image(path, {}, progress);
-  if (!file) return fail(file.error());
-  return level_set ? mask_from_level_set(file->image, path) : mask_from_image(file->image, path);
 }
 
 // The part of the result within the bounding box of the truth.
@@ -55,6 +62,8 @@ bool lie_alike(const ImageGrid& a, const ImageGrid& b) {
   return (a.origin_mm - b.origin_mm).norm() < 0.01 * voxel &&
          a.direction.isApprox(b.direction, 1e-4);
 }
+
+using Json = nlohmann::ordered_json;
 
 Json to_json(const TopologyNumbers& n) {
   return {{"components", n.components}, {"cavities", n.cavities}, {"cycles", n.cycles}};
@@ -102,13 +111,12 @@ void print_table(const MaskComparison& c, const std::optional<CenterlineFigures>
              lines->overlap.offset_mm);
 }
 
-}  // namespace
-
-int run_compare_masks(const CompareMasksArguments& arguments) {
+int run(const Arguments& arguments) {
   const Console console;
-  const auto truth = read_mask(arguments.truth, arguments.level_set, console.progress());
+  const auto truth = arguments.level_set ? read_level_set(arguments.truth, console.progress())
+                                         : read_mask(arguments.truth, console.progress());
   if (!truth) return report_error(truth.error());
-  auto result = read_mask(arguments.result, false, console.progress());
+  auto result = read_mask(arguments.result, console.progress());
   if (!result) return report_error(result.error());
   if (arguments.within_box && truth->grid.size == result->grid.size) cut_to(*truth, *result);
   const auto compared = compare_masks(*truth, *result);
@@ -127,12 +135,29 @@ int run_compare_masks(const CompareMasksArguments& arguments) {
   if (arguments.json) {
     Json json = to_json(*compared, lines);
     json["same_place"] = placed_alike;
-    print_json(json);
+    print_json(json.dump(1, ' '));
   } else {
     console.finish_line();
     print_table(*compared, lines);
   }
   return kSuccess;
+}
+
+}  // namespace
+
+void add_compare_masks(CommandLine& line) {
+  const auto arguments = std::make_shared<Arguments>();
+  Arguments& a = *arguments;
+  const Command command = line.command(
+      "compare-masks", "how alike two masks are: voxels, surfaces, topology, centerlines");
+  command.add("TRUTH", a.truth, "mask image, nonzero inside").required();
+  command.add("RESULT", a.result, "mask image on the same grid").required();
+  command.flag("--level-set", a.level_set, "TRUTH is a level set, negative inside");
+  command.flag("--within-box", a.within_box,
+               "leave out what lies beyond the bounding box of TRUTH");
+  command.flag("--no-centerlines", a.no_centerlines, "do not thin the masks");
+  add_json_flag(command, a.json);
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace angiospline::cli

@@ -1,15 +1,27 @@
 #include "recovery/thesis/experiments/reproduce.h"
 
 #include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/console.h"
-#include "cli/figures.h"
+#include "cli/options.h"
 
 namespace angiospline::cli {
 namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Arguments {
+  std::vector<std::string> tables;  // none: all
+  ReproduceOptions options;
+  bool json = false;
+};
 
 std::string figure(const std::optional<double>& value) {
   if (!value) return "-";
@@ -60,22 +72,17 @@ void print(const ReproducedTable& table) {
   for (const std::string& note : table.notes) fmt::print("  note: {}\n", note);
 }
 
-}  // namespace
-
-int run_reproduce(const ReproduceArguments& arguments) {
+int run(const Arguments& arguments) {
   const Console console;
   const std::vector<std::string>& ids =
       arguments.tables.empty() ? reproducible_tables() : arguments.tables;
-  ReproduceOptions options;
-  options.quick = arguments.quick;
-  options.seed = arguments.random_seed;
   Json all = Json::array();
   if (!arguments.json)
     fmt::print(
         "The thesis's images are not available: these are phantoms of the same sizes, shapes and "
         "noise.\n");
   for (const std::string& id : ids) {
-    const auto table = reproduce_table(id, options, console.progress());
+    const auto table = reproduce_table(id, arguments.options, console.progress());
     console.finish_line();
     if (!table) return report_error(table.error());
     if (arguments.json)
@@ -85,8 +92,26 @@ int run_reproduce(const ReproduceArguments& arguments) {
     std::fflush(stdout);
   }
   if (arguments.json)
-    print_json({{"images", "phantoms; the thesis's images are not available"}, {"tables", all}});
+    print_json(
+        Json{{"images", "phantoms; the thesis's images are not available"}, {"tables", all}}.dump(
+            1, ' '));
   return kSuccess;
+}
+
+}  // namespace
+
+void add_reproduce(CommandLine& line) {
+  const auto arguments = std::make_shared<Arguments>();
+  Arguments& a = *arguments;
+  const Command command =
+      line.command("reproduce", "the thesis's experiments on phantoms, its figures beside ours");
+  command.add("TABLE", a.tables,
+              "7.1 rings 7.2 7.3 7.4 7.5 cylinder potato 7.6 vessel bifurcation smoothing "
+              "(default: all)");
+  command.flag("--quick", a.options.quick, "a few rows and iterations only, to see that it runs");
+  command.add("--random-seed", a.options.seed, "of the noise");
+  add_json_flag(command, a.json);
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace angiospline::cli

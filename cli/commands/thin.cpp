@@ -1,50 +1,43 @@
+#include <memory>
+
 #include <fmt/format.h>
 
 #include "cli/commands.h"
 #include "cli/console.h"
-#include "cli/figures.h"
-#include "recovery/imaging/mask/topology_numbers.h"
-#include "recovery/imaging/skeleton/thinning.h"
+#include "cli/options.h"
+#include "pipeline/graph.h"
+#include "pipeline/report_json.h"
 
 namespace angiospline::cli {
 namespace {
 
-std::size_t count(const Mask& mask) { return foreground_offsets(mask).size(); }
+struct Arguments {
+  std::filesystem::path mask;
+  std::filesystem::path skeleton;
+  bool json = false;
+};
+
+int run(const Arguments& arguments) {
+  const Console console;
+  const auto thinned = thin_file(arguments.mask, arguments.skeleton, {.topology = arguments.json},
+                                 console.progress());
+  if (!thinned) return report_error(thinned.error());
+  if (arguments.json) print_json(json_text(*thinned));
+  console.say(fmt::format("{} voxels thinned to {} -> {}", thinned->voxels_before,
+                          thinned->voxels_after, arguments.skeleton.string()));
+  return kSuccess;
+}
 
 }  // namespace
 
-int run_thin(const ThinArguments& arguments) {
-  const Console console;
-  Stopwatch watch;
-  const auto file = read_image(arguments.mask, {}, console.progress());
-  if (!file) return report_error(file.error());
-  const auto mask = mask_from_image(file->image, arguments.mask);
-  if (!mask) return report_error(mask.error());
-  watch.lap("read");
-  const auto skeleton = thin(*mask, {}, console.progress());
-  if (!skeleton) return report_error(skeleton.error());
-  watch.lap("thin");
-  if (const auto written = write_image(*skeleton, arguments.output); !written) {
-    return report_error(written.error());
-  }
-  const std::size_t before = count(*mask);
-  const std::size_t after = count(*skeleton);
-  if (arguments.json) {
-    const auto topology_json = [](const TopologyNumbers& numbers) {
-      return Json{{"components", numbers.components},
-                  {"cavities", numbers.cavities},
-                  {"cycles", numbers.cycles}};
-    };
-    Json json{{"voxels_in", before},
-              {"voxels_out", after},
-              {"before", topology_json(topology_numbers(*mask))},
-              {"after", topology_json(topology_numbers(*skeleton))}};
-    watch.lap("count");
-    json["seconds"] = seconds_json(watch);
-    print_json(json);
-  }
-  console.say(fmt::format("{} voxels thinned to {} -> {}", before, after, arguments.output));
-  return kSuccess;
+void add_thin(CommandLine& line) {
+  const auto arguments = std::make_shared<Arguments>();
+  Arguments& a = *arguments;
+  const Command command = line.command("thin", "mask to skeleton, one voxel thick, same topology");
+  command.add("MASK", a.mask, "mask image, nonzero inside").required();
+  command.add("-o,--output", a.skeleton, "skeleton image to write").required();
+  add_json_flag(command, a.json);
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace angiospline::cli

@@ -11,13 +11,13 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+#include "base/process.h"
 #include "io/cad/brep_file.h"
 #include "io/cad/gmsh_script.h"
 #include "io/cad/iges_file.h"
 #include "io/cad/order_patches.h"
 #include "io/cad/split_joins.h"
 #include "io/cad/turn_patches.h"
-#include "io/export/side_process.h"
 #include "io/meshes/glb_file.h"
 #include "io/meshes/stl_file.h"
 #include "io/meshes/vtk_file.h"
@@ -284,7 +284,11 @@ Result<ExportReport> export_model(const Model& model, const std::vector<fs::path
   if (!report) return report;
   if (meanwhile) meanwhile();
   if (copy) {
-    if (auto written = copy->wait(progress); !written) return fail(written.error());
+    if (auto written = copy->wait(progress); !written) {
+      Error error = written.error();
+      if (error.where.empty()) error.where = step->string();  // the copy crashed
+      return fail(std::move(error));
+    }
   }
   return report;
 }
