@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "io/model/certificate_json.h"
 #include "modeling/build/build_model.h"
