@@ -52,14 +52,15 @@ TEST(FinishModel, CertifiesTheNetworkAsItIsWhateverTheFiles) {
 TEST(FinishModel, WarningsAboutFilesJoinThoseOfTheModel) {
   const test::TemporaryFolder folder;
   Model model = tube();
-  model.warnings = {"of the model"};
+  model.warnings = {{WarningCode::kUnspecified, "of the model"}};
   ExportOptions options;
   options.tessellation.most_triangles = 100;
   Stopwatch watch;
   const auto finished = finish_model(model, {folder.path() / "a.stl"}, options, {}, watch);
   ASSERT_TRUE(finished) << finished.error().message();
   ASSERT_EQ(finished->model.warnings.size(), 2U);
-  EXPECT_EQ(finished->model.warnings[0], "of the model");
+  EXPECT_EQ(finished->model.warnings[0].text, "of the model");
+  EXPECT_EQ(finished->model.warnings[1].code, WarningCode::kMeshCoarsened);
 }
 
 TEST(FinishModel, CallsBackOnceWithTheModelAfterTheCheck) {

@@ -30,9 +30,9 @@ Image<float> vessel() {
   return image;
 }
 
-bool mentions(const std::vector<std::string>& texts, const std::string& words) {
-  return std::any_of(texts.begin(), texts.end(), [&](const std::string& text) {
-    return text.find(words) != std::string::npos;
+bool mentions(const std::vector<Warning>& warnings, const std::string& words) {
+  return std::any_of(warnings.begin(), warnings.end(), [&](const Warning& warning) {
+    return warning.text.find(words) != std::string::npos;
   });
 }
 
