@@ -198,11 +198,12 @@ Result<void> unpacked(std::string_view packed) {
       {static_cast<ErrorKind>(std::stoi(pieces[0])), pieces[1], pieces[2], pieces[3], pieces[4]});
 }
 
-// In the copy: never returns.
-[[noreturn]] void work_apart(const SideProcess::Work& work, int pipe) {
+// In the copy: never returns. `listening` are the signals blocked before it was made.
+[[noreturn]] void work_apart(const SideProcess::Work& work, int pipe, const sigset_t& listening) {
   ::setpgid(0, 0);  // Ctrl-C at the terminal reaches the parent, which asks once
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   std::signal(SIGTERM, note_stop_of_copy);
+  ::pthread_sigmask(SIG_SETMASK, &listening, nullptr);
   Progress progress;
   progress.stop_requested = [] { return copy_should_stop != 0; };
 
@@ -231,11 +232,19 @@ Result<void> unpacked(std::string_view packed) {
 std::optional<SideProcess> SideProcess::start(const Work& work) {
   std::array<int, 2> pipe{-1, -1};
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0) return std::nullopt;
+
+  // A request to stop that comes before the copy listens waits until it does.
+  sigset_t stop;
+  sigset_t before;
+  ::sigemptyset(&stop);
+  ::sigaddset(&stop, SIGTERM);
+  ::pthread_sigmask(SIG_BLOCK, &stop, &before);
   const pid_t child = ::fork();
   if (child == 0) {
     ::close(pipe[0]);
-    work_apart(work, pipe[1]);
+    work_apart(work, pipe[1], before);
   }
+  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
   ::close(pipe[1]);
   if (child < 0) {
     ::close(pipe[0]);

@@ -7,11 +7,18 @@ _angiospline() {
   done
   local words= values=
   case $command in
-    '') words='recover seed fit segment thin graph smooth check compare compare-masks convert phantom reproduce -h --help --version' ;;
+    '') words='recover seed build fit segment thin graph smooth check compare compare-masks convert phantom reproduce -h --help --version' ;;
     recover)
       words='-h --help --series --stack-spacing --seed --seed-voxel --dark -N --neighborhood -M --deviations --background --smooth --cut-swellings --limit -o --output --root --cut-contacts --no-fit --refinements --json'
       ;;
     seed)
+      words='-h --help -o --output --extend-inlets --extend-outlets --clearance --format --jobs --threads --unit --radius-is-diameter --voxel-width --frame --name --step-schema --json'
+      case $before in
+        --frame) values='LPS RAS' ;;
+        --step-schema) values='AP242 AP214' ;;
+      esac
+      ;;
+    build)
       words='-h --help -o --output --extend-inlets --extend-outlets --clearance --format --jobs --threads --unit --radius-is-diameter --voxel-width --frame --name --step-schema --json'
       case $before in
         --frame) values='LPS RAS' ;;
