@@ -68,11 +68,11 @@ tidy: build
 	@git ls-files '*.cpp' | grep -v '^tests/\|^benches/' | xargs -P $(JOBS) -n 4 clang-tidy-14 --quiet -p $(BUILD)
 
 docs:
-	@scripts/install_packages.sh scripts/packages-dev.txt
+	@scripts/install_packages.sh <(echo doxygen)
 	@scripts/make_api_docs.sh build/docs
 
 gallery: build
-	@scripts/install_packages.sh scripts/packages-dev.txt
+	@scripts/install_packages.sh <(printf '%s\n' python3-numpy python3-pil)
 	@/usr/bin/python3 scripts/make_gallery.py $(BUILD)/cli/angiospline docs/images
 
 clean:
