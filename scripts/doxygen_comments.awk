@@ -23,9 +23,15 @@ function escaped(text) {
     indent = substr($0, 1, index($0, "//") - 1)
     text = substr($0, index($0, "//") + 2)
     # "// ---- part of the file ----" and "// namespace" are for readers of the source.
-    if (text ~ /^ *-{3,}/) { print ""; next }
+    if (text ~ /^ *---/) { print ""; next }
     if (NR == 1) { print indent "/// \\file"; }
-    printf("%s///%s\n", indent, escaped(text))
+    # An indented line that begins like "1. ", "- " or "name   " is an entry of a list: it stays a line, and so does
+    # the first one behind the list.
+    is_indented = text ~ /^   +[^ ]/
+    is_entry = text ~ /^   +([0-9]+[.)] |- |[^ ]+   )/
+    breaks = (is_entry || (was_indented && !is_indented && text != "")) ? " \\n" : ""
+    was_indented = is_indented
+    print indent "///" breaks escaped(text)
     next
   }
   if (match($0, /[^ \t].*[;,{)][ \t]+\/\/ /) && $0 !~ /^[ \t]*(#|namespace|})/) {
@@ -33,5 +39,6 @@ function escaped(text) {
     print substr($0, 1, at - 1) "///<" escaped(substr($0, at + 2))
     next
   }
+  was_indented = 0
   print
 }

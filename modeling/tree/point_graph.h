@@ -33,13 +33,11 @@ struct PointGraph {
 // The tree whose nodes are the ends and junctions of the graph and whose branches are the chains
 // between them, oriented away from the inlets. In this order:
 //   1. points at exactly the same position become one where an edge joins them, where they hang on
-//   the
-//      same point (a doubled edge), or where one of them is an end (that closes loops); what was
-//      joined is said in `assumptions`. Each branch keeps the radius of its own copy;
+//      the same point (a doubled edge), or where one of them is an end (that closes loops); what
+//      was joined is listed in `assumptions`. Each branch keeps the radius of its copy;
 //   2. points without edges and doubled edges are dropped;
 //   3. an inlet is a root that is an end; a component without one gets its end of largest radius,
-//   and
-//      an assumption says so; a component without ends has none.
+//      and an assumption says so; a component without ends has none.
 // A node bears its point's name, a branch "<from>_<to>" ("<from>_<to>_via_<p>" with its first inner
 // point p where several join the same nodes); a line's name is taken instead where the branch is
 // the only one of that line and has no edge of another. A ring without junctions is one branch from
