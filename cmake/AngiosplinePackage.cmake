@@ -57,12 +57,11 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME angiospline)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
-set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "vessels to CAD, from an image or from centerlines with radii
-Turns angiography volumes or centerlines of blood vessels into closed,
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "Turns angiography volumes or centerlines of blood vessels into closed,
 tangent-plane continuous NURBS solids (STEP, IGES, BREP), meshes and reports.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libangiospline-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "${dev_depends}")
-set(CPACK_COMPONENT_DEV_DESCRIPTION "vessels to CAD: headers, static libraries and CMake package
-What a C++ program needs to build and measure models by itself.")
+set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers, static libraries and the CMake package: what a C++ program needs to
+build, measure and write models by itself.")
 include(CPack)

@@ -1,9 +1,11 @@
 // docs/troubleshooting.md has an entry for each warning code and none for others, and quotes only
 // errors that the program has.
+#include <cctype>
 #include <fstream>
 #include <regex>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -62,6 +64,34 @@ TEST(Troubleshooting, EachWarningIsShownAsPrintedAndSaysWhatToDo) {
     ++seen;
   }
   EXPECT_GT(seen, 30);
+}
+
+// "wall-folds" is kWallFolds in C++.
+std::string enumerator(std::string_view name) {
+  std::string result = "WarningCode::k";
+  bool capital = true;
+  for (const char c : name) {
+    if (c != '-') result += capital ? static_cast<char>(std::toupper(c)) : c;
+    capital = c == '-';
+  }
+  return result;
+}
+
+TEST(Troubleshooting, ExplainsNoCodeThatNothingGives) {
+  std::set<std::string> given;
+  static const std::regex kCode(R"(WarningCode::k\w+)");
+  for (const source_tree::File& file : source_tree::files()) {
+    if (file.library == "base") continue;
+    for (const std::string& line : file.lines) {
+      for (std::sregex_iterator at(line.begin(), line.end(), kCode), none; at != none; ++at) {
+        given.insert(at->str());
+      }
+    }
+  }
+  for (const WarningKind& kind : warning_kinds()) {
+    if (kind.code == WarningCode::kUnspecified) continue;  // of files only
+    EXPECT_TRUE(given.contains(enumerator(kind.name))) << kind.name;
+  }
 }
 
 // Every string literal of the sources, adjacent ones joined as the compiler does it.
