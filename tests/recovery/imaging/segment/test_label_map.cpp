@@ -1,10 +1,12 @@
 // What is inside a mask, a label map or a level set, whatever its pixel type.
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "recovery/imaging/image/any_image.h"
 #include "recovery/imaging/segment/label_map.h"
 
 namespace angiospline {
@@ -47,6 +49,16 @@ TEST(LabelMap, ALevelSetIsNegativeInsideAndItsZeroIsOutside) {
   const auto mask = mask_from_level_set(row_of<float>({-2, -1e-30F, 0, 1, kNan}), "level.nrrd");
   ASSERT_TRUE(mask);
   EXPECT_EQ(inside(*mask), (std::vector<int>{1, 1, 0, 0, 0}));
+}
+
+TEST(AnyImage, KnowsItsPixelTypeItsGridAndItsValues) {
+  const auto image = row_of<std::uint16_t>({0, 65535});
+  const AnyImage any = image;
+  EXPECT_EQ(pixel_type_name(any), "uint16");
+  EXPECT_EQ(grid_of(any).origin_mm, image.grid.origin_mm);
+  EXPECT_EQ(value_at(any, {1, 0, 0}), 65535.0);
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(value_at(AnyImage(row_of<float>({kNan})), {0, 0, 0})));
 }
 
 TEST(LabelMap, AnEmptyOneIsRefusedByTheNameOfItsFile) {
