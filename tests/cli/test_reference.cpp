@@ -42,14 +42,19 @@ std::string output_of(const std::string& command, const TemporaryFolder& folder)
   return text_of(folder / "said");
 }
 
-// The names of the subcommands, in the order of the program's help.
+// The names of the subcommands in the order of the program's help, each with its other names.
 std::vector<std::string> commands() {
   const std::string help = run_angiospline({"--help"}).out;
-  static const std::regex kCommand(R"(\n  ([a-z][a-z-]*)[ ,])");
+  static const std::regex kNames(R"(\n  ([a-z][a-z-]*(?:, [a-z][a-z-]*)*)  )");
+  static const std::regex kName("[a-z][a-z-]*");
   const std::string listed = help.substr(help.find("Subcommands:"));
+  const std::sregex_iterator none;
   std::vector<std::string> names;
-  for (std::sregex_iterator at(listed.begin(), listed.end(), kCommand), none; at != none; ++at) {
-    names.push_back((*at)[1]);
+  for (std::sregex_iterator line(listed.begin(), listed.end(), kNames); line != none; ++line) {
+    const std::string head = (*line)[1];
+    for (std::sregex_iterator at(head.begin(), head.end(), kName); at != none; ++at) {
+      names.push_back(at->str());
+    }
   }
   return names;
 }
@@ -115,6 +120,7 @@ TEST(BashCompletion, OffersCommandsOptionsAndChoices) {
   const TemporaryFolder folder;
   std::string all;
   for (const std::string& command : commands()) all += command + " ";
+  EXPECT_NE(all.find("seed build "), std::string::npos) << all;
   EXPECT_EQ(offered("angiospline ''", folder).substr(0, all.size()), all);
   EXPECT_EQ(offered("angiospline conv", folder), "convert\n");
   EXPECT_EQ(offered("angiospline seed tree.swc --clear", folder), "--clearance\n");
