@@ -12,7 +12,7 @@ namespace {
 using enum WarningCode;
 
 // The one list of names: one is added at its place in the enum, none is ever changed or used again.
-constexpr std::array kKinds{
+constexpr std::array kKinds = {
     WarningKind{kUnspecified, "unspecified", "the file that the warning came from gives no code"},
     WarningKind{kNoContrastAtSeeds, "no-contrast-at-seeds",
                 "the vessel does not stand out around the seeds; growing uses fixed settings"},
