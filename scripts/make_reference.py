@@ -87,7 +87,8 @@ class Option:
 class Command:
     """A help page: what the command is for, how it is called, its positionals, options and subcommands."""
 
-    def __init__(self, text):
+    def __init__(self, text, other_names=()):
+        self.other_names = list(other_names)
         lines = text.strip("\n").split("\n")
         self.about = lines[0].strip()
         usage = next(k for k, line in enumerate(lines) if line.startswith("Usage:"))
@@ -108,9 +109,15 @@ class Command:
         self.options = [Option(*entry) for entry in sections.get("Options", [])]
         self.subcommands = sections.get("Subcommands", [])
 
+    def also_called(self, quote="`"):
+        names = ", ".join(quote + name + quote for name in self.other_names)
+        return f" Also called {names}." if names else ""
 
-def help_of(program, *words):
-    return Command(subprocess.run([program, *words, "--help"], check=True, capture_output=True, text=True).stdout)
+
+def help_of(program, *names):
+    """The help page of the command with these names, or of the program itself without any."""
+    said = subprocess.run([program, *names[:1], "--help"], check=True, capture_output=True, text=True).stdout
+    return Command(said, names[1:])
 
 
 def wrapped(text):
@@ -135,7 +142,7 @@ def reference(app, commands):
     out += ["", "| command | what it does |", "|---|---|"]
     out += [f"| [{c}](#{c}) | {cell(command.about)} |" for c, command in commands.items()]
     for c, command in commands.items():
-        out += ["", f"## {c}", "", code(command.usage), "", wrapped(command.about[0].upper() + command.about[1:] + ".")]
+        out += ["", f"## {c}", "", code(command.usage), "", wrapped(command.about[0].upper() + command.about[1:] + "." + command.also_called())]
         for line in command.more:
             out += ["", wrapped(line)]
         for title, entries in (("argument", command.positionals), ("option", command.options)):
@@ -172,7 +179,7 @@ def man_page(app, commands, version):
     entries(app.options)
     out.append(".SH SUBCOMMANDS")
     for c, command in commands.items():
-        out += [f".SS {roff(command.usage)}", roff(command.about[0].upper() + command.about[1:] + ".")]
+        out += [f".SS {roff(command.usage)}", roff(command.about[0].upper() + command.about[1:] + "." + command.also_called(""))]
         for line in command.more:
             out += [".PP", roff(line)]
         entries(command.positionals + command.options)
@@ -188,10 +195,11 @@ def bash_completion(app, commands):
            "  COMPREPLY=()", "  for ((k = 1; k < COMP_CWORD; ++k)); do",
            "    if [[ ${COMP_WORDS[k]} != -* ]]; then command=${COMP_WORDS[k]}; break; fi", "  done",
            "  local words= values=", "  case $command in"]
-    top = " ".join(list(commands) + [n for o in app.options for n in o.names])
+    every = [name for c, command in commands.items() for name in [c, *command.other_names]]
+    top = " ".join(every + [n for o in app.options for n in o.names])
     out.append(f"    '') words='{top}' ;;")
     for c, command in commands.items():
-        out.append(f"    {c})")
+        out.append(f"    {'|'.join([c, *command.other_names])})")
         out.append(f"      words='{' '.join(n for o in command.options for n in o.names)}'")
         cases = [(("|".join(o.names)), o) for o in command.options if o.choices]
         if cases:
@@ -200,7 +208,7 @@ def bash_completion(app, commands):
             out.append("      esac")
         for o in command.positionals:
             if o.choices:
-                out.append(f"      if [[ $before == {c} && $word != -* ]]; then values='{' '.join(o.choices)}'; fi")
+                out.append(f"      if [[ $before == $command && $word != -* ]]; then values='{' '.join(o.choices)}'; fi")
         out.append("      ;;")
     out += ["  esac",
             "  # Where nothing is offered, the shell completes names of files.",
@@ -244,10 +252,11 @@ def zsh_completion(app, commands):
     out += [f"    {spec} \\" for spec in specs(app)]
     out += ["    '1:command:->command' '*::argument:->argument'", "  case $state in", "    command)",
             "      local -a commands=("]
-    out += [f"        '{c}:{zsh_text(command.about)}'" for c, command in commands.items()]
+    out += [f"        '{name}:{zsh_text(command.about)}'"
+            for c, command in commands.items() for name in [c, *command.other_names]]
     out += ["      )", "      _describe command commands", "      ;;", "    argument)", "      case $words[1] in"]
     for c, command in commands.items():
-        out += [f"        {c})", "          _arguments \\"]
+        out += [f"        {'|'.join([c, *command.other_names])})", "          _arguments \\"]
         lines = specs(command)
         out += [f"            {spec} \\" for spec in lines[:-1]] + [f"            {lines[-1]}", "          ;;"]
     out += ["      esac", "      ;;", "  esac", "}", "_angiospline \"$@\""]
@@ -259,9 +268,8 @@ def main():
     root = pathlib.Path(sys.argv[2]) if len(sys.argv) > 2 else pathlib.Path(__file__).resolve().parent.parent
     version = subprocess.run([program, "--version"], check=True, capture_output=True, text=True).stdout.strip()
     app = help_of(program)
-    # A command with another name ("build, seed") has its page under each.
-    commands = {name.strip(): help_of(program, name.strip())
-                for names, _ in app.subcommands for name in names.split(",")}
+    # A command with another name is listed as "seed, build".
+    commands = {names.split(", ")[0]: help_of(program, *names.split(", ")) for names, _ in app.subcommands}
     files = {"docs/reference.md": reference(app, commands), "cli/man/angiospline.1": man_page(app, commands, version),
              "cli/completions/angiospline.bash": bash_completion(app, commands),
              "cli/completions/_angiospline": zsh_completion(app, commands)}

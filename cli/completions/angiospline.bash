@@ -11,14 +11,7 @@ _angiospline() {
     recover)
       words='-h --help --series --stack-spacing --seed --seed-voxel --dark -N --neighborhood -M --deviations --background --smooth --cut-swellings --limit -o --output --root --cut-contacts --no-fit --refinements --json'
       ;;
-    seed)
-      words='-h --help -o --output --extend-inlets --extend-outlets --clearance --format --jobs --threads --unit --radius-is-diameter --voxel-width --frame --name --step-schema --json'
-      case $before in
-        --frame) values='LPS RAS' ;;
-        --step-schema) values='AP242 AP214' ;;
-      esac
-      ;;
-    build)
+    seed|build)
       words='-h --help -o --output --extend-inlets --extend-outlets --clearance --format --jobs --threads --unit --radius-is-diameter --voxel-width --frame --name --step-schema --json'
       case $before in
         --frame) values='LPS RAS' ;;
@@ -65,7 +58,7 @@ _angiospline() {
       ;;
     phantom)
       words='-h --help -o --output --truth --truth-tree --snr --random-seed --xray'
-      if [[ $before == phantom && $word != -* ]]; then values='rings cylinder potato bifurcation bent-vessel tree'; fi
+      if [[ $before == $command && $word != -* ]]; then values='rings cylinder potato bifurcation bent-vessel tree'; fi
       ;;
     reproduce)
       words='-h --help --quick --random-seed --json'

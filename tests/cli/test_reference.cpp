@@ -43,20 +43,21 @@ std::string output_of(const std::string& command, const TemporaryFolder& folder)
 }
 
 // The names of the subcommands in the order of the program's help, each with its other names.
-std::vector<std::string> commands() {
+std::vector<std::vector<std::string>> commands() {
   const std::string help = run_angiospline({"--help"}).out;
   static const std::regex kNames(R"(\n  ([a-z][a-z-]*(?:, [a-z][a-z-]*)*)  )");
   static const std::regex kName("[a-z][a-z-]*");
   const std::string listed = help.substr(help.find("Subcommands:"));
   const std::sregex_iterator none;
-  std::vector<std::string> names;
+  std::vector<std::vector<std::string>> result;
   for (std::sregex_iterator line(listed.begin(), listed.end(), kNames); line != none; ++line) {
     const std::string head = (*line)[1];
+    result.emplace_back();
     for (std::sregex_iterator at(head.begin(), head.end(), kName); at != none; ++at) {
-      names.push_back(at->str());
+      result.back().push_back(at->str());
     }
   }
-  return names;
+  return result;
 }
 
 // The long names of a command's options.
@@ -89,12 +90,17 @@ TEST(Reference, PageManPageAndCompletionsKnowEveryCommandAndOption) {
   man.erase(std::remove(man.begin(), man.end(), '\\'), man.end());
   const std::string zsh = committed("cli/completions/_angiospline");
   int options = 0;
-  for (const std::string& command : commands()) {
+  for (const std::vector<std::string>& names : commands()) {
+    const std::string& command = names.front();
     const std::size_t section = page.find("\n## " + command + "\n");
     ASSERT_NE(section, std::string::npos) << command;
     const std::string own = page.substr(section, page.find("\n## ", section + 1) - section);
     EXPECT_NE(man.find(".SS angiospline " + command), std::string::npos) << command;
-    EXPECT_NE(zsh.find("'" + command + ":"), std::string::npos) << command;
+    for (const std::string& name : names) {
+      EXPECT_NE(zsh.find("'" + name + ":"), std::string::npos) << name;
+      if (name == command) continue;
+      EXPECT_NE(own.find("Also called `" + name + "`"), std::string::npos) << name;
+    }
     for (const std::string& option : options_of(command)) {
       EXPECT_TRUE(std::regex_search(own, std::regex("[`, ]" + option + "[` ,]")))
           << command << " " << option;
@@ -119,11 +125,14 @@ std::string offered(const std::string& words, const TemporaryFolder& folder) {
 TEST(BashCompletion, OffersCommandsOptionsAndChoices) {
   const TemporaryFolder folder;
   std::string all;
-  for (const std::string& command : commands()) all += command + " ";
+  for (const std::vector<std::string>& names : commands()) {
+    for (const std::string& name : names) all += name + " ";
+  }
   EXPECT_NE(all.find("seed build "), std::string::npos) << all;
   EXPECT_EQ(offered("angiospline ''", folder).substr(0, all.size()), all);
   EXPECT_EQ(offered("angiospline conv", folder), "convert\n");
   EXPECT_EQ(offered("angiospline seed tree.swc --clear", folder), "--clearance\n");
+  EXPECT_EQ(offered("angiospline build tree.swc --clear", folder), "--clearance\n");
   EXPECT_EQ(offered("angiospline seed tree.swc --frame ''", folder), "LPS RAS\n");
   EXPECT_EQ(offered("angiospline phantom ri", folder), "rings\n");
 }
