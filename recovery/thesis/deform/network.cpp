@@ -4,9 +4,10 @@
 #include <cmath>
 #include <numeric>
 
-#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 #include <fmt/format.h>
 
+#include "kernel/numerics/sparse_cholesky.h"
 #include "kernel/refine/control_mesh.h"
 #include "kernel/refine/refinement.h"
 #include "recovery/thesis/deform/mesh.h"
@@ -347,7 +348,7 @@ RefinedNetwork coarsen_network(const SurfaceNetwork& fine, const SurfaceNetwork&
   A.setFromTriplets(entries.begin(), entries.end());
   const Eigen::MatrixX3d rest =
       (fine.control_points_mm - coarse.control_points_mm * A.transpose()).transpose();
-  const Eigen::SimplicialLDLT<Sparse> normal(A.transpose() * A);
+  const SparseCholesky normal(A.transpose() * A);
   const Eigen::MatrixX3d step = normal.solve(A.transpose() * rest);
   RefinedNetwork out{coarse, 0.0};
   out.network.control_points_mm += step.transpose();

@@ -4,9 +4,10 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SparseCholesky>
 #include <fmt/format.h>
+
+#include "kernel/numerics/sparse_cholesky.h"
+#include "kernel/numerics/spectrum.h"
 
 namespace angiospline {
 namespace {
@@ -231,18 +232,16 @@ namespace {
 double least_eigenvalue(const Eigen::SparseMatrix<double>& L) {
   constexpr Eigen::Index kDense = 1500;
   if (L.rows() <= kDense) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(L),
-                                                               Eigen::EigenvaluesOnly);
-    return eigen.eigenvalues()[1];  // [0] is the translation's, 0
+    return symmetric_eigenvalues(Eigen::MatrixXd(L))[1];  // [0] is the translation's, 0
   }
   constexpr double kShift = 1e-9;
   Eigen::SparseMatrix<double> shifted = L;
   shifted.diagonal().array() += kShift;
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> inverse(shifted);
+  const SparseCholesky inverse(shifted);
   Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(L.rows(), -1, 1);
   for (int k = 0; k < 60; ++k) {
     x.array() -= x.mean();
-    x = inverse.solve(x.normalized()).eval();
+    x = inverse.solve(x.normalized());
   }
   x.array() -= x.mean();
   x.normalize();

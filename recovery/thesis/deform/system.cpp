@@ -7,11 +7,12 @@
 #include <numbers>
 
 #include <Eigen/IterativeLinearSolvers>
-#include <Eigen/SVD>
-#include <Eigen/SparseCholesky>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <unsupported/Eigen/FFT>
+
+#include "kernel/numerics/sparse_cholesky.h"
+#include "kernel/numerics/spectrum.h"
 
 namespace angiospline {
 namespace {
@@ -30,17 +31,14 @@ class DenseDivision : public Division {
 class SparseDivision : public Division {
  public:
   explicit SparseDivision(const Eigen::SparseMatrix<double>& A) : factors_(A) {}
-  bool sound() const {
-    return factors_.info() == Eigen::Success && factors_.vectorD().minCoeff() > 0;
-  }
+  bool sound() const { return factors_.is_positive_definite(); }
   Points3 operator()(const Points3& b) const override {
     const Eigen::MatrixX3d columns = b.transpose();
-    const Eigen::MatrixX3d x = factors_.solve(columns);
-    return x.transpose();
+    return factors_.solve(columns).transpose();
   }
 
  private:
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors_;
+  SparseCholesky factors_;
 };
 
 class GradientDivision : public Division {
@@ -237,14 +235,11 @@ double ElementSystem::condition(const LaplacianPolynomial& p) const {
 }
 
 std::unique_ptr<Division> divide_by_svd(const Eigen::SparseMatrix<double>& A) {
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(Eigen::MatrixXd(A),
-                                           Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::VectorXd& values = svd.singularValues();
+  const auto [U, values, V] = singular_values(Eigen::MatrixXd(A), SingularVectors::kThin);
   Eigen::VectorXd inverse(values.size());
   for (Eigen::Index k = 0; k < values.size(); ++k)
     inverse[k] = values[k] <= kSingular * values[0] ? 0.0 : 1 / values[k];
-  return std::make_unique<DenseDivision>(svd.matrixV() * inverse.asDiagonal() *
-                                         svd.matrixU().transpose());
+  return std::make_unique<DenseDivision>(V * inverse.asDiagonal() * U.transpose());
 }
 
 std::unique_ptr<Division> divide_by_circulant(const PeriodicGrid& grid, double centre, double side,

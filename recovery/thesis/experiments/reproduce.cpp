@@ -4,7 +4,6 @@
 #include <chrono>
 #include <functional>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "recovery/thesis/experiments/tables.h"

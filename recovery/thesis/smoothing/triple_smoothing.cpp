@@ -8,7 +8,6 @@
 #include <set>
 #include <utility>
 
-#include <Eigen/Dense>
 #include <fmt/format.h>
 #include <nlopt.hpp>
 #include <tbb/parallel_for.h>
@@ -16,6 +15,7 @@
 #include "base/index.h"
 #include "base/random.h"
 #include "kernel/continuity/triple_curve.h"
+#include "kernel/numerics/spectrum.h"
 #include "kernel/refine/reshape.h"
 
 namespace angiospline {
@@ -217,7 +217,8 @@ class TripleSystem {
       if (jacobian != nullptr) {
         for (const TripleGradient& g : triple.gradient) {
           const int patch = g.surface == 0 ? join.a.patch : join.b.patch;
-          const int column = network_.patches[index(patch)].control[static_cast<std::size_t>(g.point)];
+          const int column =
+              network_.patches[index(patch)].control[static_cast<std::size_t>(g.point)];
           const int unknown = unknown_[index(column)];
           if (unknown < 0) continue;
           jacobian->block<1, 3>(row + g.node, unknown) +=
@@ -233,12 +234,11 @@ class TripleSystem {
     Eigen::VectorXd values;
     Eigen::MatrixXd J;
     evaluate(values, &J);
-    const Eigen::BDCSVD<Eigen::MatrixXd> svd(J, Eigen::ComputeThinU);
-    const Eigen::VectorXd& s = svd.singularValues();
+    const auto [U, s, V] = singular_values(J, SingularVectors::kThinLeft);
     Eigen::Index rank = 0;
     while (rank < s.size() && s(rank) > kDependent * s(0)) ++rank;
     // Divided by their singular values: all of one size.
-    chosen_ = svd.matrixU().leftCols(rank) * s.head(rank).cwiseInverse().asDiagonal();
+    chosen_ = U.leftCols(rank) * s.head(rank).cwiseInverse().asDiagonal();
   }
 
   // Combinations whose gradient vanishes at several places in general position: these are
@@ -261,11 +261,10 @@ class TripleSystem {
       all.middleCols(k * J.cols(), J.cols()) = J;
     }
     network_.control_points_mm = here;
-    const Eigen::BDCSVD<Eigen::MatrixXd> svd(all, Eigen::ComputeFullU);
-    const Eigen::VectorXd& s = svd.singularValues();
+    const auto [U, s, V] = singular_values(all, SingularVectors::kFullLeft);
     const auto changing = (s.array() > kUnchanging * s(0)).count();
     report.fixed = static_cast<int>(all.rows() - changing);
-    report.fixed_residual = (svd.matrixU().rightCols(report.fixed).transpose() * values).norm();
+    report.fixed_residual = (U.rightCols(report.fixed).transpose() * values).norm();
     report.fixed_angle_deg = fixed_end_angle(all);
   }
 
