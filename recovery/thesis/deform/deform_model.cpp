@@ -7,21 +7,16 @@
 
 #include "base/index.h"
 #include "recovery/fit/fit_model.h"
+#include "recovery/thesis/deform/rules.h"
 #include "recovery/thesis/edges/edge_localisation.h"
 
 namespace angiospline {
 namespace {
 
-// Of the default solver. Thin plates keep spurious edges from denting the wall; the membranes of
-// the small meshes of DeformOptions resist a change of radius, so they are left out. Each stage
-// starts at rest where the last one ended, so that plates resist only what the next one adds.
-constexpr double kBending = 10.0;
-constexpr int kStages = 3;
-constexpr double kNear = 2.0;  // voxels: edges pull no farther once the first stage is done
+using namespace deform_rules;
 
 // Rims' rows back into their planes; centres and radii anew, from points of the rims.
 void flatten_rims(SurfaceNetwork& network) {
-  constexpr int kPoints = 16;  // of each side
   for (Rim& rim : network.rims) {
     for (const Side& side : rim.sides) {
       const Patch& patch = network.patches[index(side.patch)];
@@ -34,12 +29,14 @@ void flatten_rims(SurfaceNetwork& network) {
         p -= rim.normal.dot(p - rim.center_mm) * rim.normal;
       }
     }
-    Points3 points(3, std::ssize(rim.sides) * kPoints);
+
+    // The rim's circle anew: the mean of its points and of their distances from it.
+    Points3 points(3, std::ssize(rim.sides) * kRimPoints);
     Eigen::Index next = 0;
     for (const Side& side : rim.sides) {
       const BSplineSurface<3> surface = patch_surface(network, side.patch);
-      for (int k = 0; k < kPoints; ++k) {
-        const double along = (k + 0.5) / kPoints;
+      for (int k = 0; k < kRimPoints; ++k) {
+        const double along = (k + 0.5) / kRimPoints;
         const Vec2 uv = side_parameters(network.patches[index(side.patch)], side.side, along);
         points.col(next++) = surface.at(uv.x(), uv.y());
       }
@@ -69,14 +66,13 @@ Points3 points_of_columns(const SurfaceNetwork& network) {
 // Edges that no open end's plane cuts off: a vessel that goes on past the model, or is round there,
 // would pull the end's nodes along its axis and together.
 EdgePoints within_rims(const EdgePoints& edges, const std::vector<Rim>& rims) {
-  constexpr double kBeside = 2.0;  // radii: what is farther from the axis belongs to something else
   std::vector<Eigen::Index> kept;
   for (Eigen::Index k = 0; k < edges.count(); ++k) {
     const bool beyond = std::any_of(rims.begin(), rims.end(), [&](const Rim& rim) {
       const Vec3 from = edges.at_mm.col(k) - rim.center_mm;
       const double along = from.dot(rim.normal);
-      return along > 0 && along < kBeside * rim.radius_mm &&
-             (from - along * rim.normal).norm() < kBeside * rim.radius_mm;
+      return along > 0 && along < kBesideRim * rim.radius_mm &&
+             (from - along * rim.normal).norm() < kBesideRim * rim.radius_mm;
     });
     if (!beyond) kept.push_back(k);
   }
@@ -100,6 +96,8 @@ std::vector<PartFigures> figures_of_parts(const SurfaceNetwork& fine, const Poin
     for (const int c : patch.control) of_region[index(patch.region)][index(c)] = 1;
   }
   of_region.back().assign(index(moves.cols()), 1);
+
+  // Means and largest values of each region, and of all of them at last.
   std::vector<PartFigures> parts;
   for (std::size_t r = 0; r < of_region.size(); ++r) {
     PartFigures part;
@@ -124,10 +122,10 @@ std::vector<PartFigures> figures_of_parts(const SurfaceNetwork& fine, const Poin
 // share with others. Their names.
 std::vector<std::string> hold_unpulled(const SurfaceNetwork& fine, const DeformReport& report,
                                        const Points3& start, Points3& nodes) {
-  constexpr double kLeastPulled = 0.1;  // share of a region's nodes
   std::vector<std::string> names;
   std::vector<char> moves(index(nodes.cols()), 0);
   for (std::size_t r = 0; r < fine.regions.size(); ++r) {
+    // A region stands and falls as a whole: by the share of its nodes that an edge pulls.
     int count = 0, pulled = 0;
     for (const Patch& patch : fine.patches) {
       if (index(patch.region) != r) continue;
@@ -145,10 +143,102 @@ std::vector<std::string> hold_unpulled(const SurfaceNetwork& fine, const DeformR
       for (const int c : patch.control) moves[index(c)] = 1;
     }
   }
+
   for (Eigen::Index k = 0; k < nodes.cols(); ++k) {
     if (!moves[index(k)]) nodes.col(k) = start.col(k);
   }
   return names;
+}
+
+// The default solver, which is ours; the others are the thesis's and keep to its ways.
+bool is_ours(const DeformModelOptions& options) { return options.method == DeformMethod::kSparse; }
+
+// The places that pull: thick edges as the thesis has them (6.1), or thin ones between voxels.
+Result<EdgePoints> edges_for(const Model& model, const Image<float>& image,
+                             const DeformModelOptions& options, const Progress& progress) {
+  EdgeOptions sought{EdgePercentile{options.edge_percentile}};
+  if (is_ours(options)) sought.thinning = EdgeThinning::kAcross;
+  const auto field = find_edges(image, sought, progress);
+  if (!field) return fail(field.error());
+
+  EdgePoints edges = edge_points(*field, image.grid);
+  if (is_ours(options)) edges = between_voxels(std::move(edges), localise_edges(image, *field));
+  return within_rims(edges, model.network.rims);
+}
+
+// How the first stage is solved.
+DeformOptions options_for(const DeformMesh& start, const DeformModelOptions& options) {
+  DeformOptions how =
+      steady_options(options.method, start, options.potential, options.strength, options.reach_vox);
+  how.most_iterations = options.most_iterations;
+  how.potential.bright_inside = !options.dark;
+  if (options.stiffness) how.elements.spring = *options.stiffness;
+  if (!is_ours(options)) return how;
+
+  how.elements.membrane = kPlateMembrane;
+  how.elements.bending = kPlateBending;
+  how.potential.farthest_vox = options.reach_vox;
+  return how;
+}
+
+// The mesh at rest. Ours starts again from there, with its plates at rest, among near edges only.
+Result<Deformation> run_stages(const DeformMesh& start, const EdgePoints& edges, double voxel_mm,
+                               const DeformModelOptions& options, const Progress& progress) {
+  DeformOptions how = options_for(start, options);
+  auto deformed = deform(start, edges, voxel_mm, how, progress);
+  if (!deformed) return deformed;
+
+  int iterations = deformed->report.iterations;
+  for (int again = 1; is_ours(options) && again < kStages; ++again) {
+    if (deformed->report.termination == Termination::kUnstable) break;
+    how.potential.farthest_vox = std::min(options.reach_vox, kNearVox);
+    deformed = deform(deformed->mesh, edges, voxel_mm, how, progress);
+    if (!deformed) return deformed;
+    iterations += deformed->report.iterations;
+  }
+  deformed->report.iterations = iterations;
+  return deformed;
+}
+
+struct SmoothPatches {
+  SmoothedNetwork smooth;
+  double coarsening_mm = 0.0;
+};
+
+// The deformed control mesh as the model's own patches again: the nearest ones in the mean square,
+// rims flat, joins tangent-plane continuous with floating boundaries (3.2.1).
+Result<SmoothPatches> back_to_patches(const SurfaceNetwork& fine, const SurfaceNetwork& original,
+                                      const Progress& progress) {
+  RefinedNetwork coarse = coarsen_network(fine, original);
+  flatten_rims(coarse.network);
+  apply_dependencies(coarse.network);
+  auto smooth = smooth_network(std::move(coarse.network), {}, progress);
+  if (!smooth) return fail(smooth.error());
+  return SmoothPatches{std::move(*smooth), coarse.distance_mm};
+}
+
+// What a user should know of the result.
+std::vector<Warning> warnings_of(const std::vector<SmoothedPart>& parts,
+                                 const std::vector<std::string>& without_edge,
+                                 Termination termination) {
+  std::vector<Warning> warnings;
+  for (const SmoothedPart& part : parts) {
+    if (part.outcome != SmoothedPart::Outcome::kRefused) continue;
+    warnings.push_back({WarningCode::kPartNotSmoothed,
+                        fmt::format("{} could not be made smooth after the deformation: {}",
+                                    part.name, part.why)});
+  }
+  for (const std::string& name : without_edge) {
+    warnings.push_back(
+        {WarningCode::kNoEdgeInImage,
+         fmt::format("no edge found in the image near {}: it was left as it was", name)});
+  }
+  if (termination != Termination::kAtRest) {
+    warnings.push_back(
+        {WarningCode::kDeformationNotAtRest,
+         fmt::format("the deformation did not come to rest: {}", to_string(termination))});
+  }
+  return warnings;
 }
 
 }  // namespace
@@ -156,79 +246,45 @@ std::vector<std::string> hold_unpulled(const SurfaceNetwork& fine, const DeformR
 Result<DeformedModel> deform_model(const Model& model, const Image<float>& image,
                                    const DeformModelOptions& options, const Progress& progress) {
   if (auto apart = frames_apart(model.network.control_points_mm, image.grid)) return fail(*apart);
-  const bool ours = options.method == DeformMethod::kSparse;
-  EdgeOptions sought{EdgePercentile{options.edge_percentile}};
-  if (ours) sought.thinning = EdgeThinning::kAcross;
-  const auto field = find_edges(image, sought, progress);
-  if (!field) return fail(field.error());
+  const auto edges = edges_for(model, image, options, progress);
+  if (!edges) return fail(edges.error());
+
+  // The finite-element mesh: points of the surface, a control mesh of finer knots (3.1).
   NetworkMeshOptions fineness;
   fineness.least_pieces = options.pieces;
   auto fine = refine_network(model.network, fineness);
   if (!fine) return fail(fine.error());
   DeformMesh start = control_mesh(fine->network);
   start.nodes_mm = points_of_columns(fine->network);
-  const double voxel = std::cbrt(image.grid.spacing_mm.prod());
-  DeformOptions how =
-      steady_options(options.method, start, options.potential, options.strength, options.reach_vox);
-  how.most_iterations = options.most_iterations;
-  how.potential.bright_inside = !options.dark;
-  if (options.stiffness) how.elements.spring = *options.stiffness;
-  EdgePoints edges = edge_points(*field, image.grid);
-  if (ours) edges = between_voxels(std::move(edges), localise_edges(image, *field));
-  edges = within_rims(edges, model.network.rims);
-  if (ours) {
-    how.elements.membrane = 0.0;
-    how.elements.bending = kBending;
-    how.potential.farthest_vox = options.reach_vox;
-  }
-  auto deformed = deform(start, edges, voxel, how, progress);
-  int iterations = deformed ? deformed->report.iterations : 0;
-  for (int again = 0; ours && deformed && again < kStages - 1; ++again) {
-    if (deformed->report.termination == Termination::kUnstable) break;
-    how.potential.farthest_vox = std::min(options.reach_vox, kNear);
-    deformed = deform(deformed->mesh, edges, voxel, how, progress);
-    if (deformed) iterations += deformed->report.iterations;
-  }
+
+  const double voxel_mm = std::cbrt(image.grid.spacing_mm.prod());
+  auto deformed = run_stages(start, *edges, voxel_mm, options, progress);
   if (!deformed) return fail(deformed.error());
-  deformed->report.iterations = iterations;
 
   DeformedModel result;
   result.without_edge =
       hold_unpulled(fine->network, deformed->report, start.nodes_mm, deformed->mesh.nodes_mm);
+  const Points3 moves = deformed->mesh.nodes_mm - start.nodes_mm;
   result.nodes = start.node_count();
-  result.edges = static_cast<int>(edges.count());
+  result.edges = static_cast<int>(edges->count());
   result.mesh = triangles_of(deformed->mesh, Caps::kFans);
   result.residual_force = residual_field(deformed->report, result.mesh);
-  result.parts = figures_of_parts(fine->network, deformed->mesh.nodes_mm - start.nodes_mm,
-                                  deformed->report.residual_force);
-  fine->network.control_points_mm += deformed->mesh.nodes_mm - start.nodes_mm;
-  RefinedNetwork coarse = coarsen_network(fine->network, model.network);
-  result.coarsening_mm = coarse.distance_mm;
+  result.parts = figures_of_parts(fine->network, moves, deformed->report.residual_force);
   result.report = std::move(deformed->report);
-  flatten_rims(coarse.network);
-  apply_dependencies(coarse.network);
-  auto smooth = smooth_network(std::move(coarse.network), {}, progress);
-  if (!smooth) return fail(smooth.error());
-  result.angle_before_deg = smooth->before_deg;
-  result.angle_after_deg = smooth->after_deg;
+
+  // Control points move as the points of the surface did that they stand for.
+  fine->network.control_points_mm += moves;
+  auto patches = back_to_patches(fine->network, model.network, progress);
+  if (!patches) return fail(patches.error());
+  result.coarsening_mm = patches->coarsening_mm;
+  result.angle_before_deg = patches->smooth.before_deg;
+  result.angle_after_deg = patches->smooth.after_deg;
+
   result.model = model;
-  result.model.network = std::move(smooth->network);
-  for (const SmoothedPart& part : smooth->parts) {
-    if (part.outcome != SmoothedPart::Outcome::kRefused) continue;
-    result.model.warnings.push_back(
-        {WarningCode::kPartNotSmoothed,
-         fmt::format("{} could not be made smooth after the deformation: {}", part.name,
-                     part.why)});
-  }
-  for (const std::string& name : result.without_edge) {
-    result.model.warnings.push_back(
-        {WarningCode::kNoEdgeInImage,
-         fmt::format("no edge found in the image near {}: it was left as it was", name)});
-  }
-  if (result.report.termination != Termination::kAtRest) {
-    result.model.warnings.push_back(
-        {WarningCode::kDeformationNotAtRest, fmt::format("the deformation did not come to rest: {}",
-                                                         to_string(result.report.termination))});
+  result.model.network = std::move(patches->smooth.network);
+  for (std::string& text :
+       warnings_of(patches->smooth.parts, result.without_edge, result.report.termination)) {
+    result.model.warnings.push_back(std::move(warning));
   }
   return result;
 }

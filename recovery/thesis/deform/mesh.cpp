@@ -7,6 +7,8 @@
 
 #include <Eigen/Geometry>
 
+#include "base/index.h"
+
 namespace angiospline {
 namespace {
 
@@ -44,12 +46,45 @@ DeformMesh circle_contour(const Vec3& centre_mm, double radius_mm, int count) {
   return mesh;
 }
 
+DeformMesh control_mesh(const SurfaceNetwork& network) {
+  DeformMesh mesh;
+  mesh.nodes_mm = network.control_points_mm;
+  std::vector<std::pair<int, int>> springs;
+  std::vector<char> used(index(mesh.node_count()), 0);
+
+  // A quadrilateral between four control points of a patch, a spring along each of its sides.
+  for (const Patch& patch : network.patches) {
+    const int nu = patch.u.control_point_count(), nv = patch.v.control_point_count();
+    const auto node = [&](int i, int j) { return patch.control[index(i) * nv + index(j)]; };
+    const auto spring = [&](int a, int b) {
+      if (a != b) springs.emplace_back(std::min(a, b), std::max(a, b));
+    };
+    for (const int k : patch.control) used[index(k)] = 1;
+    for (int i = 0; i < nu; ++i)
+      for (int j = 0; j < nv; ++j) {
+        if (i + 1 < nu) spring(node(i, j), node(i + 1, j));
+        if (j + 1 < nv) spring(node(i, j), node(i, j + 1));
+        if (i + 1 < nu && j + 1 < nv)
+          mesh.faces.push_back({node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)});
+      }
+  }
+
+  // Each pair of neighbours once, in growing order.
+  EXPECTS(std::find(used.begin(), used.end(), 0) == used.end());
+  std::sort(springs.begin(), springs.end());
+  springs.erase(std::unique(springs.begin(), springs.end()), springs.end());
+  mesh.springs.resize(2, std::ssize(springs));
+  for (std::size_t s = 0; s < springs.size(); ++s)
+    mesh.springs.col(static_cast<Eigen::Index>(s)) << springs[s].first, springs[s].second;
+  return mesh;
+}
+
 std::vector<std::vector<int>> neighbours(const DeformMesh& mesh) {
-  std::vector<std::vector<int>> out(static_cast<std::size_t>(mesh.node_count()));
+  std::vector<std::vector<int>> out(index(mesh.node_count()));
   for (Eigen::Index s = 0; s < mesh.springs.cols(); ++s) {
     const int a = mesh.springs(0, s), b = mesh.springs(1, s);
-    out[static_cast<std::size_t>(a)].push_back(b);
-    out[static_cast<std::size_t>(b)].push_back(a);
+    out[index(a)].push_back(b);
+    out[index(b)].push_back(a);
   }
   return out;
 }
@@ -66,10 +101,12 @@ Points3 node_normals(const DeformMesh& mesh) {
       normals.col((k + 1) % n) += outward;
     }
   }
+  // Half the cross product of the diagonals is a quadrilateral's area vector, plane or not.
   for (const auto& f : mesh.faces) {
     const Vec3 area = (p.col(f[2]) - p.col(f[0])).cross(Vec3(p.col(f[3]) - p.col(f[1])));
     for (const int k : f) normals.col(k) += area;
   }
+
   for (Eigen::Index k = 0; k < normals.cols(); ++k) {
     const double length = normals.col(k).norm();
     if (length > 0) normals.col(k) /= length;
@@ -101,6 +138,8 @@ std::optional<PeriodicGrid> periodic_grid(const DeformMesh& mesh) {
     for (int k = 0; k < grid.columns; ++k) grid.order.push_back(k);
     return grid;
   }
+
+  // Only a tube has two openings with as many nodes each; from one of them on its rows are found.
   const auto ends = openings(mesh);
   if (ends.size() != 2 || ends[0].size() != ends[1].size()) return std::nullopt;
   const auto near = neighbours(mesh);
@@ -111,14 +150,15 @@ std::optional<PeriodicGrid> periodic_grid(const DeformMesh& mesh) {
     ++grid.rows;
     for (const int k : row) {
       grid.order.push_back(k);
-      used[static_cast<std::size_t>(k)] = 1;
+      used[index(k)] = 1;
     }
+
     // The next row: of each node the one neighbour that is still free.
     std::vector<int> following;
     for (const int k : row) {
       std::vector<int> free;
-      for (const int other : near[static_cast<std::size_t>(k)])
-        if (used[static_cast<std::size_t>(other)] == 0) free.push_back(other);
+      for (const int other : near[index(k)])
+        if (used[index(other)] == 0) free.push_back(other);
       if (free.size() > 1) return std::nullopt;
       if (free.size() == 1) following.push_back(free.front());
     }
@@ -133,17 +173,21 @@ TriangleMesh triangles_of(const DeformMesh& mesh, Caps caps) {
   const auto holes = caps == Caps::kFans ? openings(mesh) : std::vector<std::vector<int>>{};
   std::size_t fan = 0;
   for (const auto& hole : holes) fan += hole.size();
+
   TriangleMesh out;
   out.parts.push_back({"wall", PartKind::kBody, 0.0});
   out.points_mm.resize(3, mesh.node_count() + std::ssize(holes));
   out.points_mm.leftCols(mesh.node_count()) = mesh.nodes_mm;
   out.triangles.resize(3, static_cast<Eigen::Index>(2 * mesh.faces.size() + fan));
+
   Eigen::Index t = 0;
   for (const auto& f : mesh.faces) {
     out.triangles.col(t++) << f[0], f[1], f[2];
     out.triangles.col(t++) << f[0], f[2], f[3];
   }
-  out.part_of.assign(static_cast<std::size_t>(out.triangles.cols()), 0);
+  out.part_of.assign(index(out.triangles.cols()), 0);
+
+  // A fan over each opening about the mean of its nodes, on the other side of the opening's loop.
   for (std::size_t h = 0; h < holes.size(); ++h) {
     const int apex = mesh.node_count() + static_cast<int>(h);
     out.parts.push_back({"cap_" + std::to_string(h + 1), PartKind::kCap, 0.0});
@@ -151,7 +195,7 @@ TriangleMesh triangles_of(const DeformMesh& mesh, Caps caps) {
     for (std::size_t k = 0; k < holes[h].size(); ++k) {
       const int a = holes[h][k], b = holes[h][(k + 1) % holes[h].size()];
       mean += mesh.nodes_mm.col(a) / static_cast<double>(holes[h].size());
-      out.part_of[static_cast<std::size_t>(t)] = static_cast<int>(h) + 1;
+      out.part_of[index(t)] = static_cast<int>(h) + 1;
       out.triangles.col(t++) << b, a, apex;
     }
     out.points_mm.col(apex) = mean;

@@ -10,14 +10,9 @@
 #include <tbb/parallel_for.h>
 
 #include "kernel/geometry/point_index.h"
+#include "recovery/thesis/deform/rules.h"
 
 namespace angiospline {
-namespace {
-
-// Rounding of two distances and of a path, as a share of them.
-constexpr double kRounding = 1e-12;
-
-}  // namespace
 
 EdgePoints edge_points(const EdgeField& field, const ImageGrid& grid) {
   EdgePoints out;
@@ -43,7 +38,8 @@ void NearestNodes::ask(const Points3& nodes, const std::vector<int>& which) {
           const int p = which[k];
           const auto [near, next] = places_index.nearest_two(points_.col(p));
           const double first = near.distance, second = next.distance;
-          const double gap = second - first - kRounding * (first + second + travelled_);
+          const double gap =
+              second - first - deform_rules::kDistanceRounding * (first + second + travelled_);
           nearest_[static_cast<std::size_t>(p)] = static_cast<int>(near.point);
           good_until_[static_cast<std::size_t>(p)] = travelled_ + std::max(0.0, gap) / 2;
         }
@@ -62,6 +58,8 @@ const std::vector<int>& NearestNodes::update(const Points3& nodes) {
     travelled_ += std::sqrt((nodes - last_).colwise().squaredNorm().maxCoeff());
   }
   last_ = nodes;
+
+  // An answer is in doubt once some node may have gone half the gap between the two nearest.
   std::vector<int> doubtful;
   for (std::size_t p = 0; p < count; ++p)
     if (!(travelled_ < good_until_[p])) doubtful.push_back(static_cast<int>(p));
@@ -105,15 +103,21 @@ Points3 EdgePotentials::forces(const Points3& nodes_vox, const Points3& normals)
   const double outward = options_.bright_inside ? -1 : 1;
   const double scale = options_.strength * static_cast<double>(nodes_vox.cols()) /
                        static_cast<double>(edges_.count());
+
+  // Each edge pulls only the node nearest to it (6.2).
   Points3 sum = Points3::Zero(3, nodes_vox.cols());
   pulls_.assign(static_cast<std::size_t>(nodes_vox.cols()), 0);
   for (Eigen::Index e = 0; e < edges_.count(); ++e) {
     const int node = nearest[static_cast<std::size_t>(e)];
+
+    // Gates against edges of other things.
     const Vec3 way = edges_.at_mm.col(e) - nodes_vox.col(node);
     const double r = way.norm();
     if (r == 0 || r > farthest) continue;
     if (least_cosine > -1 && outward * edges_.normals.col(e).dot(normals.col(node)) < least_cosine)
       continue;
+
+    // Gravity as (6.1) has it, springs as (6.2), along the way to the edge.
     const double reach = options_.reach_vox;
     const double pull =
         options_.kind == PotentialKind::kGravity ? std::exp(-r * r / (reach * reach)) : r / reach;

@@ -8,9 +8,12 @@
 
 #include "kernel/numerics/sparse_cholesky.h"
 #include "kernel/numerics/spectrum.h"
+#include "recovery/thesis/deform/rules.h"
 
 namespace angiospline {
 namespace {
+
+using namespace deform_rules;
 
 constexpr std::pair<DeformMethod, std::string_view> kMethods[] = {
     {DeformMethod::kSparse, "sparse"},
@@ -21,13 +24,6 @@ constexpr std::pair<DeformMethod, std::string_view> kMethods[] = {
     {DeformMethod::kCentralDft, "central-dft"},
     {DeformMethod::kRungeKutta1, "runge-kutta-1"},
     {DeformMethod::kRungeKutta4, "runge-kutta-4"}};
-
-// A factor fills in, and its making and its triangular solves grow faster than the mesh; conjugate
-// gradients on these well-conditioned matrices take some twenty products whatever its size. The
-// place of rest does not depend on their error, only the way there.
-constexpr int kMostFactorised = 10000;  // nodes
-constexpr double kMostCondition = 1e4;  // some 1,000 products
-constexpr double kGradientError = 1e-8;
 
 // Positions and velocities, in voxels and voxels per unit of time.
 struct State {
@@ -53,27 +49,16 @@ class Motion {
     const double dt = options_.time_step, mass = options_.elements.mass;
     const ElementOptions& e = options_.elements;
     std::optional<PeriodicGrid> grid;
-    const bool circulant = options_.method == DeformMethod::kEulerDft ||
-                           options_.method == DeformMethod::kEulerDftPhantom ||
-                           options_.method == DeformMethod::kCentralDft;
-    if (circulant && !(grid = periodic_grid(mesh_)))
+    if (is_circulant(options_.method) && !(grid = periodic_grid(mesh_)))
       return fail({ErrorKind::kBadInput, "mesh is not one tube or contour", "mesh",
                    std::string(to_string(options_.method)),
                    "circulant methods need rows of nodes around a tube"});
+
+    // C = damping L + drag I (5.24); with mass M / dt^2 + C / 2 dt, the left side of (5.17).
     const double sides = mesh_.is_contour() ? 2 : 4;
     switch (options_.method) {
-      case DeformMethod::kSparse: {
-        const auto p = implicit_step(e, dt, potentials_.steepness());
-        const bool large = mesh_.node_count() > kMostFactorised;
-        if (large && system_.condition(p) <= kMostCondition) {
-          division_ = divide_by_gradients(system_.matrix(p), kGradientError);
-          break;
-        }
-        auto division = divide_by_sparse(system_.matrix(p));
-        if (!division) return fail(division.error());
-        division_ = std::move(*division);
-        break;
-      }
+      case DeformMethod::kSparse:
+        return prepare_implicit();
       case DeformMethod::kEulerSvd:
         division_ = divide_by_svd(system_.matrix({e.drag, e.damping, 0}));
         break;
@@ -100,6 +85,7 @@ class Motion {
     return {};
   }
 
+  // One time step of the method: (5.7) without mass, (5.17), (5.11) or (5.12) with it.
   void step() {
     const double dt = options_.time_step;
     switch (options_.method) {
@@ -138,15 +124,37 @@ class Motion {
   }
 
  private:
+  static bool is_circulant(DeformMethod method) {
+    return method == DeformMethod::kEulerDft || method == DeformMethod::kEulerDftPhantom ||
+           method == DeformMethod::kCentralDft;
+  }
+
+  // C + dt (K + s I): iteratively where a factor would fill in and the matrix allows it.
+  Result<void> prepare_implicit() {
+    const auto p = implicit_step(options_.elements, options_.time_step, potentials_.steepness());
+    const bool large = mesh_.node_count() > kMostFactorised;
+    if (large && system_.condition(p) <= kMostCondition) {
+      division_ = divide_by_gradients(system_.matrix(p), kGradientError);
+      return {};
+    }
+    auto division = divide_by_sparse(system_.matrix(p));
+    if (!division) return fail(division.error());
+    division_ = std::move(*division);
+    return {};
+  }
+
+  // External and internal ones, f_ext - K q (5.18).
   Points3 forces(const Points3& nodes) {
     return pull(nodes) + system_.internal(nodes, options_.form);
   }
 
+  // The state's derivative, (5.10).
   State slope_at(const State& s) {
     return {s.velocity, (forces(s.nodes) + system_.damping(s.velocity, options_.form)) /
                             options_.elements.mass};
   }
 
+  // The classical rule; (5.12) but for its k4, which is printed without dt.
   void runge_kutta_4() {
     const double dt = options_.time_step;
     const auto ahead = [&](const State& slope, double t) {
@@ -168,8 +176,9 @@ class Motion {
       state_.nodes += dt * (state_.velocity + dt * slope.velocity);
       return;
     }
-    // (M / dt^2 + C / 2dt) q+ = f - (M / dt^2) (q- - 2 q) + (C / 2dt) q-, written for q+ - q so
-    // that the pseudo-inverse of displacements does not meet positions.
+
+    // (5.17): (M / dt^2 + C / 2dt) q+ = f - (M / dt^2) (q- - 2 q) + (C / 2dt) q-, written for
+    // q+ - q so that the pseudo-inverse of displacements does not meet positions.
     const Points3 last = state_.nodes - before_;
     const Points3 b = forces(state_.nodes) + mass / (dt * dt) * last +
                       system_.damping(last, options_.form) / (2 * dt);
@@ -230,19 +239,20 @@ namespace {
 
 // The least eigenvalue of the damping that is not that of a translation.
 double least_eigenvalue(const Eigen::SparseMatrix<double>& L) {
-  constexpr Eigen::Index kDense = 1500;
-  if (L.rows() <= kDense) {
+  if (L.rows() <= kMostDenseNodes) {
     return symmetric_eigenvalues(Eigen::MatrixXd(L))[1];  // [0] is the translation's, 0
   }
-  constexpr double kShift = 1e-9;
+
+  // Inverse iteration, kept clear of the translation by taking the mean off.
   Eigen::SparseMatrix<double> shifted = L;
-  shifted.diagonal().array() += kShift;
+  shifted.diagonal().array() += kEigenvalueShift;
   const SparseCholesky inverse(shifted);
   Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(L.rows(), -1, 1);
-  for (int k = 0; k < 60; ++k) {
+  for (int k = 0; k < kInverseIterations; ++k) {
     x.array() -= x.mean();
     x = inverse.solve(x.normalized());
   }
+
   x.array() -= x.mean();
   x.normalize();
   return x.dot(L * x);
@@ -259,9 +269,12 @@ DeformOptions steady_options(DeformMethod method, const DeformMesh& mesh, Potent
   // Other methods bear their step; what cannot be used is for deform() to name.
   if (method == DeformMethod::kSparse || has_mass(method)) return o;
   if (!(strength > 0) || !(reach_vox > 0) || mesh.node_count() < 3) return o;
+
+  // The potentials' steepness s over the least eigenvalue l of the damping bounds an explicit step.
   const ElementSystem system(mesh, 1.0, o.elements);
   const double steepness = kind == PotentialKind::kGravity ? strength / 2 : strength / reach_vox;
-  o.time_step = std::min(0.4, 1.85 * least_eigenvalue(system.laplacian()) / steepness);
+  o.time_step =
+      std::min(kLongestStep, kStableStep * least_eigenvalue(system.laplacian()) / steepness);
   return o;
 }
 
@@ -278,17 +291,49 @@ std::string_view to_string(Termination termination) {
 }
 
 DeformOptions thesis_options(DeformMethod method) {
+  const ThesisSteps& steps = has_mass(method) ? kWithMass : kMassless;
   DeformOptions o;
   o.method = method;
   o.elements = {};
-  o.elements.drag = has_mass(method) ? 0.2 : 0.0;
+  o.elements.drag = steps.drag;
   o.potential = {};
-  // A massless step divides by damping and may be long; one with mass follows the swinging.
-  o.time_step = has_mass(method) ? 0.02 : 0.1;
-  o.rest_speed = 0.1;
-  o.window = has_mass(method) ? 50 : 10;
+  o.time_step = steps.time_step;
+  o.rest_speed = kThesisRestSpeed;
+  o.window = steps.window;
   return o;
 }
+
+namespace {
+
+// Whether a mesh has come to rest, by the mean places of its nodes over windows of iterations.
+class RestRule {
+ public:
+  RestRule(const DeformOptions& options, Eigen::Index nodes)
+      : window_(options.window),
+        way_(options.rest_speed * options.window * options.time_step),
+        sum_(Points3::Zero(3, nodes)) {}
+
+  // Takes in the places after one more iteration. The mean place over this window, where it ends
+  // here and lies near enough to the last one's.
+  std::optional<Points3> add(const Points3& nodes) {
+    sum_ += nodes;
+    if (++count_ % window_ != 0) return std::nullopt;
+    Points3 mean = sum_ / window_;
+    sum_.setZero();
+    if (before_.cols() > 0 && (mean - before_).colwise().norm().maxCoeff() <= way_) return mean;
+    before_ = std::move(mean);
+    return std::nullopt;
+  }
+
+ private:
+  int window_;
+  double way_;  // voxels in one window
+  Points3 sum_;
+  Points3 before_;
+  int count_ = 0;
+};
+
+}  // namespace
 
 Result<Deformation> deform(const DeformMesh& start, const EdgePoints& edges, double voxel_mm,
                            const DeformOptions& options, const Progress& progress) {
@@ -302,30 +347,31 @@ Result<Deformation> deform(const DeformMesh& start, const EdgePoints& edges, dou
   DeformReport& report = out.report;
   const Points3 rest = motion.system().rest();
   const double diagonal = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
-  Points3 last = rest, sum = Points3::Zero(3, rest.cols()), mean_before;
+  RestRule at_rest(options, rest.cols());
+  Points3 last = rest;
   while (report.iterations < options.most_iterations) {
     if (progress.should_stop()) return fail(cancelled("deforming"));
     motion.step();
     ++report.iterations;
+
+    // A step too long for the potentials throws nodes out of all bounds.
     const Points3& now = motion.nodes();
     if (!now.allFinite() || (now - rest).colwise().norm().maxCoeff() > diagonal) {
       report.termination = Termination::kUnstable;
       break;
     }
     last = now;
-    sum += now;
-    if (report.iterations % options.window != 0) continue;
-    const Points3 mean = sum / options.window;
-    sum.setZero();
-    if (mean_before.cols() > 0 && (mean - mean_before).colwise().norm().maxCoeff() <=
-                                      options.rest_speed * options.window * options.time_step) {
+
+    if (auto mean = at_rest.add(now)) {
       report.termination = Termination::kAtRest;
-      last = mean;
+      last = std::move(*mean);
       break;
     }
-    mean_before = mean;
-    progress.at("deforming", static_cast<double>(report.iterations) / options.most_iterations);
+    if (report.iterations % options.window == 0)
+      progress.at("deforming", static_cast<double>(report.iterations) / options.most_iterations);
   }
+
+  // Residual forces as thesis 7.3.5 draws them: what potentials still pull at the place of rest.
   out.mesh.nodes_mm = last * voxel_mm;
   report.residual_force = motion.pull(last).colwise().norm().transpose();
   report.edges_per_node = motion.potentials().pulls_per_node();

@@ -13,12 +13,14 @@
 
 #include "kernel/numerics/sparse_cholesky.h"
 #include "kernel/numerics/spectrum.h"
+#include "recovery/thesis/deform/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kSingular = 1e-10;  // of the largest singular value or eigenvalue
+using namespace deform_rules;
 
+// By a pseudo-inverse: O(n^2) for each right side.
 class DenseDivision : public Division {
  public:
   explicit DenseDivision(Eigen::MatrixXd inverse) : inverse_(std::move(inverse)) {}
@@ -28,6 +30,7 @@ class DenseDivision : public Division {
   Eigen::MatrixXd inverse_;  // symmetric
 };
 
+// By a sparse factor.
 class SparseDivision : public Division {
  public:
   explicit SparseDivision(const Eigen::SparseMatrix<double>& A) : factors_(A) {}
@@ -41,6 +44,7 @@ class SparseDivision : public Division {
   SparseCholesky factors_;
 };
 
+// By conjugate gradients, to a relative error.
 class GradientDivision : public Division {
  public:
   GradientDivision(Eigen::SparseMatrix<double> A, double error) : A_(std::move(A)) {
@@ -66,6 +70,8 @@ class GradientDivision : public Division {
       solvers_;
 };
 
+// By the eigenvalues of a circulant matrix, which are the transform of its first row (5.28
+// to 5.30).
 class CirculantDivision : public Division {
  public:
   CirculantDivision(const PeriodicGrid& grid, double centre, double side, bool phantom)
@@ -73,6 +79,7 @@ class CirculantDivision : public Division {
     const int rim = phantom_ ? 1 : 0;
     rows_ = grid.rows + 2 * rim;
     columns_ = grid.columns + 2 * rim;
+
     // Of the first row (5.26): c0, then a `side` for each neighbour, wrapped around.
     std::vector<std::complex<double>> c(static_cast<std::size_t>(rows_) * columns_);
     const auto n = static_cast<int>(c.size());
@@ -80,6 +87,8 @@ class CirculantDivision : public Division {
     for (const int step : {1, columns_})
       if (step == 1 || rows_ > 1)
         for (const int at : {step % n, (n - step % n) % n}) c[static_cast<std::size_t>(at)] += side;
+
+    // Eigenvalues near 0 are those of a mesh moving as a whole: as in a pseudo-inverse they give 0.
     std::vector<std::complex<double>> transformed;
     fft_.fwd(transformed, c);
     double largest = 0;
@@ -88,6 +97,8 @@ class CirculantDivision : public Division {
       inverse_.push_back(std::abs(x.real()) <= kSingular * largest ? 0.0 : 1 / x.real());
   }
 
+  // Transform, product with 1 / eigenvalue, and back (5.30); phantom nodes repeat the other end of
+  // their row, and the rows beyond both ends stay 0 (5.33).
   Points3 operator()(const Points3& b) const override {
     Points3 out(3, b.cols());
     for (int coordinate = 0; coordinate < 3; ++coordinate) {
@@ -97,9 +108,11 @@ class CirculantDivision : public Division {
           const int column = (k + grid_.columns) % grid_.columns;
           field[slot(r, k)] = b(coordinate, node(r, column));
         }
+
       fft_.fwd(transformed, field);
       for (std::size_t k = 0; k < transformed.size(); ++k) transformed[k] *= inverse_[k];
       fft_.inv(field, transformed);
+
       for (int r = 0; r < grid_.rows; ++r)
         for (int k = 0; k < grid_.columns; ++k)
           out(coordinate, node(r, k)) = field[slot(r, k)].real();
@@ -149,6 +162,9 @@ LaplacianPolynomial implicit_step(const ElementOptions& e, double dt, double ste
 ElementSystem::ElementSystem(const DeformMesh& mesh, double voxel_mm, const ElementOptions& options)
     : springs_(mesh.springs), options_(options), rest_(mesh.nodes_mm / voxel_mm) {
   rest_length_.resize(springs_.cols());
+
+  // Superposition of the elements (5.2): L has 1 and -1 for each spring. Zeros on the diagonal keep
+  // nodes without one.
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(static_cast<std::size_t>(4 * springs_.cols() + rest_.cols()));
   for (int k = 0; k < rest_.cols(); ++k) entries.emplace_back(k, k, 0.0);
@@ -174,12 +190,16 @@ Points3 ElementSystem::sum_over_springs(const Points3& field) const {
   return sum;
 }
 
+// -K(q) q, thesis 5.1.1: springs pull along their axes, so that their stiffness turns with them;
+// membranes and plates are linear in the displacement.
 Points3 ElementSystem::internal(const Points3& nodes, SystemForm form) const {
   const Points3 moved = nodes - rest_;
   const auto stretch = [&](Eigen::Index s) {  // of a spring, per length: its weight in K(x) x
     const double length = (nodes.col(springs_(1, s)) - nodes.col(springs_(0, s))).norm();
     return length > 0 ? options_.spring * (1 - rest_length_[s] / length) : 0.0;
   };
+
+  // Assembled anew in every step (5.2): the matrix the thesis finds costly.
   if (form == SystemForm::kAssembled) {
     const LaplacianPolynomial bent{0, options_.membrane, options_.bending};
     const Eigen::SparseMatrix<double> K = matrix(bent);
@@ -196,6 +216,8 @@ Points3 ElementSystem::internal(const Points3& nodes, SystemForm form) const {
     axial.setFromTriplets(entries.begin(), entries.end());
     return -(moved * K + nodes * axial);
   }
+
+  // Element by element (5.18).
   Points3 force = Points3::Zero(3, nodes.cols());
   if (options_.spring > 0)
     for (Eigen::Index s = 0; s < springs_.cols(); ++s) {
