@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
-#include "kernel/refine/refinement.h"
+#include "kernel/refine/control_mesh.h"
 #include "recovery/thesis/deform/mesh.h"
 #include "recovery/thesis/deform/network_cut.h"
 #include "recovery/thesis/deform/rules.h"
