@@ -18,6 +18,8 @@ namespace {
 void measure_topology(const BoundaryModel& model, Certificate& certificate) {
   int characteristic = 0;
   std::vector<bool> used(index(model.vertex_count), false);
+
+  // V - E + F, as vertices, edges and faces are met; a closed shell has each edge once each way.
   certificate.closed = model.shells > 0;
   for (const BoundaryEdge& edge : model.edges) {
     for (const int v : {edge.first_vertex, edge.last_vertex}) {
@@ -36,6 +38,7 @@ void measure_topology(const BoundaryModel& model, Certificate& certificate) {
     characteristic += 2 - face.loops;
     if (face.shell < 0) certificate.closed = false;
   }
+
   certificate.solids = model.solids;
   if (certificate.closed) certificate.genus = model.shells - characteristic / 2;
 }
@@ -48,6 +51,8 @@ void gather_faces(const BoundaryModel& model, const std::vector<FaceMeasure>& fa
     const FaceMeasure& m = faces[f];
     certificate.faces.push_back({face.name, face.kind, m.area_mm2});
     certificate.area_mm2 += m.area_mm2;
+
+    // Only walls are asked whether they fold or bend: caps are plane.
     if (face.kind != FaceKind::kWall) continue;
     if (m.jacobian_ratio < certificate.min_jacobian_ratio ||
         certificate.min_jacobian_face.empty()) {

@@ -8,12 +8,12 @@
 
 #include "base/index.h"
 #include "kernel/evaluate/grid.h"
+#include "modeling/check/rules.h"
 
 namespace angiospline {
 namespace {
 
-// A normal shorter than this share of the mean on its face has no usable direction.
-constexpr double kDegenerate = 1e-9;
+using namespace check_rules;
 
 std::vector<double> edge_samples(const BoundaryEdge& edge, int intervals) {
   std::vector<double> samples{edge.breaks.front()};
@@ -35,7 +35,7 @@ struct EdgeLine {
 Vec3 normal_inside(const BSplineSurface<3>& patch, const Vec2& uv, double least) {
   const Vec2 center(0.5 * (patch.u().first() + patch.u().last()),
                     0.5 * (patch.v().first() + patch.v().last()));
-  for (const double share : {1e-6, 1e-4, 1e-2}) {
+  for (const double share : kInsideShares) {
     const Vec2 at = uv + share * (center - uv);
     const Vec3 normal = normal_vector(patch, at.x(), at.y());
     if (normal.norm() > least) return normal.normalized();
@@ -51,11 +51,14 @@ EdgeLine line_on_patch(const BoundaryFace& face, const BoundaryEdge& edge, const
     const double s = (t - edge.from) / (edge.to - edge.from);
     along.push_back(use.side_from + s * (use.side_to - use.side_from));
   }
+
+  // All samples of a side are one row of a grid.
   const Vec2 start = side_parameters(patch, use.side, along.front());
   const bool along_v = use.side == PatchSide::kU0 || use.side == PatchSide::kU1;
   const SurfaceGrid<3> grid = along_v
                                   ? evaluate_grid(patch, std::vector<double>{start.x()}, along, 1)
                                   : evaluate_grid(patch, along, std::vector<double>{start.y()}, 1);
+
   EdgeLine line{grid.points(), Points3(3, grid.points().cols())};
   for (Eigen::Index k = 0; k < line.points.cols(); ++k) {
     const Vec3 normal = grid.partial(1, 0).col(k).cross(grid.partial(0, 1).col(k));
@@ -63,9 +66,7 @@ EdgeLine line_on_patch(const BoundaryFace& face, const BoundaryEdge& edge, const
     line.normals.col(k) =
         length > least
             ? Vec3(normal / length)
-            : normal_inside(patch,
-                            side_parameters(patch, use.side, along[static_cast<std::size_t>(k)]),
-                            least);
+            : normal_inside(patch, side_parameters(patch, use.side, along[index(k)]), least);
   }
   if (face.reversed) line.normals = -line.normals;
   return line;
@@ -74,10 +75,12 @@ EdgeLine line_on_patch(const BoundaryFace& face, const BoundaryEdge& edge, const
 EdgeLine line_on(const BoundaryFace& face, const BoundaryEdge& edge, const EdgeUse& use,
                  const std::vector<double>& ts, double least) {
   if (face.is_whole) return line_on_patch(face, edge, use, ts, least);
+
+  // A plane's own point is the edge's beside it; other faces have theirs by their parameters.
   const auto count = static_cast<Eigen::Index>(ts.size());
   EdgeLine line{Points3(3, count), Points3::Zero(3, count)};
   for (Eigen::Index k = 0; k < count; ++k) {
-    const double t = ts[static_cast<std::size_t>(k)];
+    const double t = ts[index(k)];
     if (face.plane) {
       const auto& [center, normal] = *face.plane;
       const Vec3 p = edge.point(t).at;
@@ -107,7 +110,7 @@ EdgeMeasure measure_edge(const BoundaryModel& model, const BoundaryEdge& edge,
   if (!is_shared(edge)) return result;
   const std::vector<double> ts = edge_samples(edge, intervals);
   const auto line = [&](const EdgeUse& use) {
-    const double least = kDegenerate * faces[index(use.face)].mean_jacobian;
+    const double least = kDegenerateNormal * faces[index(use.face)].mean_jacobian;
     return line_on(model.faces[index(use.face)], edge, use, ts, least);
   };
   const EdgeLine a = line(edge.uses[0]);
@@ -115,6 +118,8 @@ EdgeMeasure measure_edge(const BoundaryModel& model, const BoundaryEdge& edge,
   result.samples = static_cast<int>(ts.size());
   result.gap_mm = (a.points - b.points).colwise().norm().maxCoeff();
   if (!is_smooth(model, edge)) return result;
+
+  // Between the walls' normals; a sample where either has none says nothing.
   result.angle_deg = 0.0;
   result.worst_mm = a.points.col(0);
   for (Eigen::Index k = 0; k < a.points.cols(); ++k) {

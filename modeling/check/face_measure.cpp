@@ -9,17 +9,20 @@
 #include "base/index.h"
 #include "kernel/evaluate/grid.h"
 #include "kernel/numerics/quadrature.h"
+#include "modeling/check/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kGaussPoints = 8;  // on each smooth piece of an edge
+using namespace check_rules;
 
 // The larger principal curvature in absolute value; nothing where the surface is singular.
 std::optional<double> largest_curvature(const SurfaceJet& jet) {
   const Vec3 normal = jet.u.cross(jet.v);
   const double length = normal.norm();
   if (!(length > 0)) return std::nullopt;
+
+  // First and second fundamental form; mean and Gaussian curvature (do Carmo 1976, 3-3).
   const Vec3 n = normal / length;
   const double e = jet.u.squaredNorm(), f = jet.u.dot(jet.v), g = jet.v.squaredNorm();
   const double l = jet.uu.dot(n), m = jet.uv.dot(n), nn = jet.vv.dot(n);
@@ -50,7 +53,7 @@ int gauss_points(int degree) { return (3 * degree + 1) / 2; }
 Vec3 refine_extreme(const BSplineSurface<3>& patch, double u, double v, double step_u,
                     double step_v, const Vec3& direction) {
   Vec3 best = patch.at(u, v);
-  for (int round = 0; round < 26; ++round) {
+  for (int round = 0; round < kExtremeRounds; ++round) {
     const double u0 = u, v0 = v;
     for (int k = 0; k < 9; ++k) {
       const double uk = std::clamp(u0 + (k % 3 - 1) * step_u, patch.u().first(), patch.u().last());
@@ -77,6 +80,8 @@ FaceMeasure measure_patch(const BoundaryFace& face, int intervals) {
       gauss_legendre(patch.u().breakpoints(), gauss_points(patch.u().degree()));
   const PiecewiseRule qv =
       gauss_legendre(patch.v().breakpoints(), gauss_points(patch.v().degree()));
+
+  // Area and volume by Gauss's rule.
   const SurfaceGrid<3> inner = evaluate_grid(patch, qu.nodes, qv.nodes, 1);
   for (std::size_t i = 0; i < qu.nodes.size(); ++i) {
     for (std::size_t j = 0; j < qv.nodes.size(); ++j) {
@@ -91,6 +96,7 @@ FaceMeasure measure_patch(const BoundaryFace& face, int intervals) {
   result.mean_jacobian = result.area_mm2 / ((patch.u().last() - patch.u().first()) *
                                             (patch.v().last() - patch.v().first()));
 
+  // What is extreme somewhere, at samples: |Su x Sv|, curvature, the box.
   const std::vector<double> us = span_samples(patch.u(), intervals);
   const std::vector<double> vs = span_samples(patch.v(), intervals);
   const SurfaceGrid<3> grid = evaluate_grid(patch, us, vs, 2);
@@ -115,6 +121,7 @@ FaceMeasure measure_other(const BoundaryFace& face) {
     result.highest_mm = face.bounding_box->second;
   }
   if (face.plane) return result;  // a plane neither folds nor bends
+
   double sum = 0.0, least = std::numeric_limits<double>::infinity();
   for (const Vec2& uv : face.mesh.parameters) {
     const SurfaceJet jet = face.jet(uv.x(), uv.y());
@@ -133,7 +140,7 @@ FaceMeasure measure_other(const BoundaryFace& face) {
 void add_plane_share(const BoundaryFace& face, const BoundaryEdge& edge, const EdgeUse& use,
                      FaceMeasure& measure) {
   const auto& [center, normal] = *face.plane;
-  const PiecewiseRule q = gauss_legendre(edge.breaks, kGaussPoints);
+  const PiecewiseRule q = gauss_legendre(edge.breaks, kEdgeGaussPoints);
   double area = 0.0;
   for (std::size_t k = 0; k < q.nodes.size(); ++k) {
     const EdgePoint<Vec3> p = edge.point(q.nodes[k]);
@@ -146,13 +153,14 @@ void add_plane_share(const BoundaryFace& face, const BoundaryEdge& edge, const E
 
 // The box of a piece of an edge: its samples, and around the extreme ones steps that are halved.
 void add_edge_box(const BoundaryEdge& edge, FaceMeasure& measure) {
-  constexpr int kSteps = 8;
   std::vector<double> ts{edge.from};
   for (std::size_t k = 0; k + 1 < edge.breaks.size(); ++k) {
-    for (int i = 1; i <= kSteps; ++i) {
-      ts.push_back(edge.breaks[k] + (edge.breaks[k + 1] - edge.breaks[k]) * i / kSteps);
+    for (int i = 1; i <= kBoxSteps; ++i) {
+      ts.push_back(edge.breaks[k] + (edge.breaks[k + 1] - edge.breaks[k]) * i / kBoxSteps);
     }
   }
+
+  // Towards each of the box's six sides.
   for (int direction = 0; direction < 6; ++direction) {
     const int axis = direction / 2;
     const double sign = direction % 2 == 0 ? 1.0 : -1.0;
@@ -165,9 +173,9 @@ void add_edge_box(const BoundaryEdge& edge, FaceMeasure& measure) {
       }
     };
     for (const double t : ts) try_at(t);
-    constexpr int kRounds = 26;
+
     double step = (edge.to - edge.from) / static_cast<double>(ts.size() - 1);
-    for (int round = 0; round < kRounds; ++round, step /= 2) {
+    for (int round = 0; round < kExtremeRounds; ++round, step /= 2) {
       const double at = best;
       try_at(std::min(at + step, edge.to));
       try_at(std::max(at - step, edge.from));
@@ -188,7 +196,8 @@ Vec2 strip_to(const BoundaryFace& face, const Vec2& uv) {
     }
   }
   breaks.push_back(last);
-  const PiecewiseRule q = gauss_legendre(breaks, kGaussPoints);
+
+  const PiecewiseRule q = gauss_legendre(breaks, kEdgeGaussPoints);
   Vec2 sum = Vec2::Zero();
   for (std::size_t k = 0; k < q.nodes.size(); ++k) {
     const SurfaceJet jet = face.jet(q.nodes[k], uv.y());
@@ -203,7 +212,7 @@ Vec2 strip_to(const BoundaryFace& face, const Vec2& uv) {
 void add_trimmed_share(const BoundaryFace& face, const BoundaryEdge& edge, const EdgeUse& use,
                        FaceMeasure& measure) {
   if (!use.parameters) return;
-  const PiecewiseRule q = gauss_legendre(edge.breaks, kGaussPoints);
+  const PiecewiseRule q = gauss_legendre(edge.breaks, kEdgeGaussPoints);
   Vec2 sum = Vec2::Zero();
   for (std::size_t k = 0; k < q.nodes.size(); ++k) {
     const EdgePoint<Vec2> p = use.parameters(q.nodes[k]);
@@ -237,6 +246,8 @@ std::vector<FaceMeasure> measure_faces(const BoundaryModel& model, int intervals
     const BoundaryFace& face = model.faces[f];
     measures[f] = face.is_whole ? measure_patch(face, intervals) : measure_other(face);
     if (face.is_whole) return;
+
+    // Other faces get their area and volume from the edges around them.
     for (const auto& [e, k] : uses[f]) {
       const BoundaryEdge& edge = model.edges[index(e)];
       const EdgeUse& use = edge.uses[index(k)];
@@ -255,6 +266,27 @@ std::vector<FaceMeasure> measure_faces(const BoundaryModel& model, int intervals
   return measures;
 }
 
+namespace {
+
+// The point of a patch that reaches farthest in a direction, from its best grid point on.
+Vec3 extreme_of(const BSplineSurface<3>& patch, int axis, double sign, int intervals) {
+  const std::vector<double> us = span_samples(patch.u(), intervals);
+  const std::vector<double> vs = span_samples(patch.v(), intervals);
+  const SurfaceGrid<3> grid = evaluate_grid(patch, us, vs, 0);
+  Eigen::Index best = 0;
+  (sign * grid.points().row(axis)).maxCoeff(&best);
+
+  const auto i = static_cast<std::size_t>(best) / vs.size();
+  const auto j = static_cast<std::size_t>(best) % vs.size();
+  const double step_u = i + 1 < us.size() ? us[i + 1] - us[i] : us[i] - us[i - 1];
+  const double step_v = j + 1 < vs.size() ? vs[j + 1] - vs[j] : vs[j] - vs[j - 1];
+  Vec3 direction = Vec3::Zero();
+  direction(axis) = sign;
+  return refine_extreme(patch, us[i], vs[j], step_u, step_v, direction);
+}
+
+}  // namespace
+
 // The grid's box, with the patches that reach nearest to each of its sides searched further.
 std::pair<Vec3, Vec3> tight_box(const BoundaryModel& model, const std::vector<FaceMeasure>& faces,
                                 int intervals) {
@@ -263,29 +295,17 @@ std::pair<Vec3, Vec3> tight_box(const BoundaryModel& model, const std::vector<Fa
     all.lowest_mm = all.lowest_mm.cwiseMin(m.lowest_mm);
     all.highest_mm = all.highest_mm.cwiseMax(m.highest_mm);
   }
+
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1.0, 1.0}) {
-      Vec3 direction = Vec3::Zero();
-      direction(axis) = sign;
       double& bound = sign < 0 ? all.lowest_mm(axis) : all.highest_mm(axis);
       const double from_grid = bound;
       for (std::size_t f = 0; f < faces.size(); ++f) {
-        const BoundaryFace& face = model.faces[f];
-        if (!face.patch) continue;
+        if (!model.faces[f].patch) continue;
         const double reach = sign < 0 ? faces[f].lowest_mm(axis) : faces[f].highest_mm(axis);
-        // A grid misses an extreme by far less than this.
-        const double slack = 0.02 * (faces[f].highest_mm - faces[f].lowest_mm).norm();
+        const double slack = kGridSlack * (faces[f].highest_mm - faces[f].lowest_mm).norm();
         if (sign * (from_grid - reach) > slack) continue;
-        const std::vector<double> us = span_samples(face.patch->u(), intervals);
-        const std::vector<double> vs = span_samples(face.patch->v(), intervals);
-        const SurfaceGrid<3> grid = evaluate_grid(*face.patch, us, vs, 0);
-        Eigen::Index best = 0;
-        (sign * grid.points().row(axis)).maxCoeff(&best);
-        const auto i = static_cast<std::size_t>(best) / vs.size();
-        const auto j = static_cast<std::size_t>(best) % vs.size();
-        const double step_u = i + 1 < us.size() ? us[i + 1] - us[i] : us[i] - us[i - 1];
-        const double step_v = j + 1 < vs.size() ? vs[j + 1] - vs[j] : vs[j] - vs[j - 1];
-        const Vec3 p = refine_extreme(*face.patch, us[i], vs[j], step_u, step_v, direction);
+        const Vec3 p = extreme_of(*model.faces[f].patch, axis, sign, intervals);
         if (sign * (p(axis) - bound) > 0) bound = p(axis);
       }
     }

@@ -14,16 +14,12 @@
 
 #include "base/index.h"
 #include "kernel/evaluate/closest_point.h"
+#include "modeling/check/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kNearJunction = 2.0;  // radii
-constexpr double kFarOff = 0.05;
-constexpr int kAround = 24;  // points of a section, shared out among the strips
-constexpr int kNewtonSteps = 12;
-constexpr double kRingStep = 0.25;  // between the rings that find a section's place, in radii
-constexpr double kReach = 1.0;      // a ring's centroid this near, in radii, is the path's place
+using namespace check_rules;
 
 // The strips of one tube, in their order around it; u runs along the branch.
 struct Tube {
@@ -45,6 +41,8 @@ std::map<std::string, std::vector<Tube>> tubes_by_region(const SurfaceNetwork& n
       if (own.side == PatchSide::kU1) joined[index(own.patch)][1] = true;
     }
   }
+
+  // Round each body until the first strip comes again.
   std::map<std::string, std::vector<Tube>> tubes;
   std::vector<char> seen(network.patches.size(), 0);
   for (std::size_t p = 0; p < network.patches.size(); ++p) {
@@ -69,8 +67,7 @@ Vec3 ring_centroid(const Tube& tube, double u) {
   Vec3 sum = Vec3::Zero();
   int count = 0;
   for (const BSplineSurface<3>& strip : tube.strips) {
-    constexpr int kPoints = 8;
-    for (int k = 0; k < kPoints; ++k, ++count) sum += strip.at(u, (k + 0.5) / kPoints);
+    for (int k = 0; k < kRingPoints; ++k, ++count) sum += strip.at(u, (k + 0.5) / kRingPoints);
   }
   return sum / count;
 }
@@ -83,11 +80,14 @@ struct Section {
 // Where the plane through `place` across `tangent` cuts the tube near parameter `u`: nothing if it
 // leaves the tube.
 std::optional<Section> cut(const Tube& tube, double u, const Vec3& place, const Vec3& tangent) {
-  const int each = std::max(3, kAround / static_cast<int>(tube.strips.size()));
+  const int each =
+      std::max(kLeastStripPoints, kSectionPoints / static_cast<int>(tube.strips.size()));
   std::vector<Vec3> ring;
   for (const BSplineSurface<3>& strip : tube.strips) {
     for (int k = 0; k < each; ++k) {
       const double v = static_cast<double>(k) / each;
+
+      // Newton's method along the strip's own line to the plane.
       double at = u;
       double height = 0;
       for (int step = 0; step < kNewtonSteps; ++step) {
@@ -100,9 +100,10 @@ std::optional<Section> cut(const Tube& tube, double u, const Vec3& place, const 
       }
       const Vec3 point = strip.at(at, v);
       ring.push_back(point);
-      if (std::abs(height) > 1e-6 * (point - place).norm()) return std::nullopt;
+      if (std::abs(height) > kOnPlane * (point - place).norm()) return std::nullopt;
     }
   }
+
   Section section{0.0, Vec3::Zero()};
   for (const Vec3& p : ring) section.centroid_mm += p / static_cast<double>(ring.size());
   // The area in polar coordinates about the centroid: exact for a circle however its points lie.
@@ -119,25 +120,32 @@ std::optional<Section> cut(const Tube& tube, double u, const Vec3& place, const 
 // Sums over the whole tree.
 class Gauge {
  public:
+  // Compares a tube with its path, about once a radius.
   void measure(const Tube& tube, const BSplineCurve<4>& path, const std::string& branch) {
     const double length = path.knots().last();
     double mean_radius = 0;
     for (const double part : {0.1, 0.3, 0.5, 0.7, 0.9})
       mean_radius += path.at(part * length)(3) / 5;
-    const int rings = std::max(8, static_cast<int>(std::ceil(length / (kRingStep * mean_radius))));
+
+    // Rings along the tube tell which of its parameters is beside which of the path's.
+    const int rings =
+        std::max(kLeastRings, static_cast<int>(std::ceil(length / (kRingStep * mean_radius))));
     Points3 centroids(3, rings + 1);
     for (int k = 0; k <= rings; ++k) {
       centroids.col(k) = ring_centroid(tube, static_cast<double>(k) / rings);
     }
     const auto along = along_of(path, centroids);
-    const int stations = std::max(4, static_cast<int>(std::ceil(length / mean_radius)));
+
+    const int stations =
+        std::max(kLeastStations, static_cast<int>(std::ceil(length / mean_radius)));
     for (int s = 1; s < stations; ++s) {
       const double t = length * s / stations;
       const Vec4 here = path.at(t);
       const auto above = std::lower_bound(along.begin(), along.end(), t);
       if (above == along.begin() || above == along.end()) continue;
       const auto k = above - along.begin();
-      if ((centroids.col(k) - here.head<3>()).norm() > (kReach + kRingStep) * here(3)) continue;
+      if ((centroids.col(k) - here.head<3>()).norm() > (kRingReach + kRingStep) * here(3)) continue;
+
       const double u = static_cast<double>(k) / rings;
       const auto section = cut(tube, u, here.head<3>(), path.at(t, 1).head<3>().normalized());
       if (!section) {
@@ -151,6 +159,7 @@ class Gauge {
     }
   }
 
+  // How far smoothing moved the points of a branch, and then keeping vessels apart its path.
   void measure_moves(const SmoothedTree& tree, std::size_t b) {
     const CenterlineBranch& branch = tree.tree.branches[b];
     Eigen::Matrix4Xd points(4, branch.points_mm.cols());
@@ -159,6 +168,7 @@ class Gauge {
     const BSplineCurve<4>& path = tree.paths[b];
     const bool kept_apart = !tree.before_clearance.empty();
     const BSplineCurve<4>& smoothed = kept_apart ? tree.before_clearance[b] : path;
+
     const std::vector<double> moves = moves_from(points, smoothed);
     const std::vector<double> total = kept_apart ? moves_from(points, path) : moves;
     for (std::size_t i = 0; i < moves.size(); ++i) {
@@ -173,8 +183,8 @@ class Gauge {
                   result_.largest_total_move_branch);
     }
     if (!kept_apart) return;
-    constexpr int kPerControlPoint = 4;
-    const int count = kPerControlPoint * path.knots().control_point_count();
+
+    const int count = kClearanceSamples * path.knots().control_point_count();
     for (int k = 0; k <= count; ++k) {
       const double t = path.knots().last() * k / count;
       const Vec4 before = smoothed.at(t);
@@ -227,6 +237,7 @@ class Gauge {
     for (Eigen::Index i = 1; i < points.cols(); ++i) {
       along.push_back(along.back() + (points.col(i) - points.col(i - 1)).head<3>().norm());
     }
+
     const double scale = along.back() > 0 ? path.knots().last() / along.back() : 0.0;
     std::vector<double> moves;
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
@@ -239,8 +250,8 @@ class Gauge {
   // The nearest of some local minima around the start.
   static double nearest(const BSplineCurve<3>& axis, const Vec3& point, double start) {
     double best = std::numeric_limits<double>::infinity();
-    const double window = 0.02 * axis.knots().last();
-    for (const double shift : {0.0, -1.0, 1.0, -3.0, 3.0}) {
+    const double window = kSearchWindow * axis.knots().last();
+    for (const double shift : kSearchShifts) {
       const double from = std::clamp(start + shift * window, 0.0, axis.knots().last());
       best = std::min(best, closest_point_from(axis, point, from).distance);
     }
@@ -256,12 +267,15 @@ class Gauge {
       result_.largest_axis_offset = offset;
       result_.largest_offset_branch = branch;
     }
+
+    // Beside a junction the tube is blended into it, and its radius need not be the path's.
     if (near) {
       ++result_.near_junctions;
       result_.largest_radius_error_near_junctions =
           std::max(result_.largest_radius_error_near_junctions, error);
       return;
     }
+
     result_.mean_radius_error += error;
     if (error > kFarOff) ++result_.far_off;
     if (error > result_.largest_radius_error) {

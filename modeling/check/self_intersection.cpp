@@ -9,19 +9,21 @@
 
 #include "base/index.h"
 #include "kernel/geometry/triangle_crossing.h"
+#include "modeling/check/rules.h"
 #include "modeling/solid/boundary_mesh.h"
 
 namespace angiospline {
 namespace {
 
-// A crossing that finer meshes of its two faces have as well, each four times as fine as the last.
+// The place of a crossing that finer meshes of its two faces have as well.
 std::optional<Vec3> confirmed(const BoundaryModel& model, const TriangleCrossing& crossing,
                               BoundaryMeshOptions options) {
   if (model.mesh_points.cols() > 0) return crossing.place;  // there is no finer one
   std::vector<int> faces{crossing.groups[0]};
   if (crossing.groups[1] != crossing.groups[0]) faces.push_back(crossing.groups[1]);
+
   std::optional<Vec3> place;
-  for (const int finer : {4, 12}) {
+  for (const int finer : check_rules::kFinerMeshes) {
     options.finer = finer;
     const BoundaryMesh mesh = mesh_boundary(model, faces, options);
     place.reset();
@@ -48,12 +50,15 @@ Result<SelfIntersections> find_self_intersections(const BoundaryModel& model, in
                                                   const Progress& progress) {
   const auto stopped = [] { return fail(cancelled("find self-intersections")); };
   progress.at("find self-intersections", 0.4);
+
+  // As fine as the number of triangles allows: they fall with the square of the chords' turn.
   BoundaryMeshOptions options;
   const auto expected = static_cast<double>(expected_triangles(model, options));
   if (expected > most_triangles) options.turn_rad *= std::sqrt(expected / most_triangles);
   std::vector<int> faces(model.faces.size());
   std::iota(faces.begin(), faces.end(), 0);
 
+  // What is thinner than the mesh's own distance from the surface may be missed, and is said.
   SelfIntersections result;
   std::vector<double> heights(faces.size(), 0.0);
   tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t f) {
@@ -61,10 +66,13 @@ Result<SelfIntersections> find_self_intersections(const BoundaryModel& model, in
   });
   for (const double h : heights) result.resolution_mm = std::max(result.resolution_mm, h);
   if (progress.should_stop()) return stopped();
+
   const BoundaryMesh mesh = mesh_boundary(model, faces, options);
   if (progress.should_stop()) return stopped();
   const std::vector<TriangleCrossing> crossings =
       crossing_triangles(mesh.points, mesh.triangles, mesh.face_of, progress);
+
+  // One crossing for each pair of names, once a finer mesh has it too.
   const bool is_open = has_free_edges(model);
   std::set<std::array<std::string, 2>> named;
   for (const TriangleCrossing& crossing : crossings) {

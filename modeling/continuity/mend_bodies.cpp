@@ -4,14 +4,16 @@
 #include <cmath>
 #include <set>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/QR>
 
 #include "base/index.h"
+#include "modeling/continuity/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kAcross = 6;
+using namespace continuity_rules;
 
 int rows_of(const Patch& patch) { return patch.u.control_point_count(); }
 
@@ -37,6 +39,8 @@ class Mender {
         beyond.insert(network_.patches[index(side.patch)].region);
       }
     }
+
+    // What goes on beyond an end rules: first its rows are put right, then the seams follow.
     flatten_rims();
     apply_dependencies(network_);
     for (std::size_t e = 0; e < 2; ++e) {
@@ -52,7 +56,7 @@ class Mender {
   auto point(int column) { return network_.control_points_mm.col(column); }
 
   int column(int patch, int row, int j) const {
-    return network_.patches[index(patch)].control[index(row * kAcross + j)];
+    return network_.patches[index(patch)].control[index(row * kStripColumns + j)];
   }
 
   JoinedEnd end_joins(PatchSide side) const {
@@ -69,6 +73,7 @@ class Mender {
     return end;
   }
 
+  // Both rows at an open end into the rim's plane, so that the wall ends across its axis.
   void flatten_rims() {
     for (const Rim& rim : network_.rims) {
       for (const Side& side : rim.sides) {
@@ -82,13 +87,14 @@ class Mender {
 
   // Of an opening's sector: its corner and the one it shares with the next.
   void center_corners(int patch) {
-    if (network_.regions[index(network_.patches[index(patch)].region)].kind != RegionKind::kJunction) {
+    if (network_.regions[index(network_.patches[index(patch)].region)].kind !=
+        RegionKind::kJunction) {
       return;
     }
     for (const Join& join : network_.joins) {
       if (join.a.side != PatchSide::kV1 || join.b.side != PatchSide::kV0) continue;
       if (join.a.patch != patch && join.b.patch != patch) continue;
-      const Vec3 left = point(column(join.a.patch, 0, kAcross - 2));
+      const Vec3 left = point(column(join.a.patch, 0, kStripColumns - 2));
       const Vec3 right = point(column(join.b.patch, 0, 1));
       point(column(join.b.patch, 0, 0)) = (left + right) / 2;
     }
@@ -100,12 +106,13 @@ class Mender {
     const int own = side.side == PatchSide::kU0 ? 0 : rows_of(patch) - 1;
     const int next = side.side == PatchSide::kU0 ? 1 : rows_of(patch) - 2;
     std::vector<std::pair<int, int>> pairs;
-    for (int j = 0; j < kAcross; ++j) {
+    for (int j = 0; j < kStripColumns; ++j) {
       pairs.emplace_back(column(side.patch, own, j), column(side.patch, next, j));
     }
     return pairs;
   }
 
+  // From an end's row to the one beside it, in the mean.
   Vec3 mean_step(const std::vector<Side>& sides) {
     Vec3 sum = Vec3::Zero();
     for (const Side& side : sides) {
@@ -114,6 +121,8 @@ class Mender {
     return sum / static_cast<double>(sides.size());
   }
 
+  // Steps on both sides of an end along one direction: with equal steps around, tangent planes
+  // agree all along the boundary (the triple product of thesis 3.2 vanishes term by term).
   void align(const JoinedEnd& end, bool at_start) {
     const Vec3 into =
         (mean_step(end.own).normalized() - mean_step(end.others).normalized()).normalized();
@@ -122,22 +131,25 @@ class Mender {
         point(next) = point(rim) + into.dot(Vec3(point(next) - point(rim))) * into;
       }
     }
+
     // The body's steps as an affine function of the place, so that all its seams keep their ratios.
     const int row = at_start ? 0 : rows_ - 1;
     const int next_row = at_start ? 1 : rows_ - 2;
-    const Eigen::Index count = static_cast<Eigen::Index>(ring_.strips.size()) * (kAcross - 1);
+    const Eigen::Index count = static_cast<Eigen::Index>(ring_.strips.size()) * (kStripColumns - 1);
     Eigen::MatrixXd A(count, 3);
     Eigen::VectorXd steps(count);
     Points3 rims(3, count);
     std::vector<int> moved;
     for (const int strip : ring_.strips) {
-      for (int j = 0; j + 1 < kAcross; ++j) {
+      for (int j = 0; j + 1 < kStripColumns; ++j) {
         const auto k = static_cast<Eigen::Index>(moved.size());
         moved.push_back(column(strip, next_row, j));
         rims.col(k) = point(column(strip, row, j));
         steps(k) = into.dot(Vec3(point(moved.back()) - rims.col(k)));
       }
     }
+
+    // Least squares of step = c0 + c1 x + c2 y over the end's row.
     const Vec3 center = rims.rowwise().mean();
     const Vec3 x = into.unitOrthogonal();
     const Vec3 y = into.cross(x);
@@ -152,6 +164,8 @@ class Mender {
     }
   }
 
+  // Each seam point between its two neighbours, in one ratio along the whole body: two strips then
+  // have one cross tangent up to a factor. The ratio is that of a joined end, which must not move.
   void mend_seams(const std::vector<JoinedEnd>& ends) {
     const int count = static_cast<int>(ring_.strips.size());
     const bool from_start = !ends[0].others.empty();
@@ -161,20 +175,22 @@ class Mender {
       const int after = ring_.strips[index(k)];
       const auto log_ratio = [&](int row) {
         const Vec3 seam = point(column(after, row, 0));
-        return std::log((seam - Vec3(point(column(before, row, kAcross - 2)))).norm() /
+        return std::log((seam - Vec3(point(column(before, row, kStripColumns - 2)))).norm() /
                         (Vec3(point(column(after, row, 1))) - seam).norm());
       };
+
       double sum = 0;
       for (int row = 0; row < rows_; ++row) sum += log_ratio(row) / rows_;
       const double ratio = std::exp(from_start ? log_ratio(0)
                                     : from_end ? log_ratio(rows_ - 1)
                                                : sum);
+
       for (int row = 0; row < rows_; ++row) {
         const int seam = column(after, row, 0);
         const bool shared =
             (row == 0 && from_start) || (row == rows_ - 1 && !ends[1].others.empty());
         if (shared || dependent_.contains(seam)) continue;
-        const Vec3 left = point(column(before, row, kAcross - 2));
+        const Vec3 left = point(column(before, row, kStripColumns - 2));
         const Vec3 right = point(column(after, row, 1));
         point(seam) = (left + ratio * right) / (1 + ratio);
       }
@@ -194,7 +210,7 @@ std::vector<BodyRing> body_rings(const SurfaceNetwork& network) {
   const auto is_strip = [&](int p) {
     const Patch& patch = network.patches[index(p)];
     return network.regions[index(patch.region)].kind == RegionKind::kBody &&
-           patch.v.control_point_count() == kAcross && rows_of(patch) >= 4;
+           patch.v.control_point_count() == kStripColumns && rows_of(patch) >= kLeastStripRows;
   };
   for (const Join& join : network.joins) {
     const bool forward = join.a.side == PatchSide::kV1 && join.b.side == PatchSide::kV0;
@@ -204,6 +220,8 @@ std::vector<BodyRing> body_rings(const SurfaceNetwork& network) {
     const int to = forward ? join.b.patch : join.a.patch;
     if (is_strip(from) && is_strip(to)) next[index(from)] = to;
   }
+
+  // From strip to strip until the first comes again; what does not close is no body's ring.
   std::vector<BodyRing> rings;
   std::vector<char> seen(network.patches.size(), 0);
   for (int p = 0; p < static_cast<int>(network.patches.size()); ++p) {

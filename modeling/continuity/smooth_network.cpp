@@ -13,6 +13,7 @@
 
 #include "base/index.h"
 #include "modeling/continuity/mend_bodies.h"
+#include "modeling/continuity/rules.h"
 #include "modeling/junction/in_network.h"
 #include "modeling/junction/quality.h"
 #include "modeling/junction/smooth_junction.h"
@@ -20,8 +21,8 @@
 namespace angiospline {
 namespace {
 
-constexpr int kSamplesPerSpan = 16;
-constexpr double kMostTurnDeg = 60;  // of a normal, by smoothing
+using namespace continuity_rules;
+
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 using Outcome = SmoothedPart::Outcome;
@@ -38,7 +39,8 @@ double join_angle_deg(const SurfaceNetwork& network, const Join& join) {
   const BSplineSurface<3> surface_b = patch_surface(network, join.b.patch);
   const bool along_v = join.a.side == PatchSide::kU0 || join.a.side == PatchSide::kU1;
   const KnotVector& knots = along_v ? a.v : a.u;
-  const int count = kSamplesPerSpan * (knots.control_point_count() - knots.degree());
+  const int count = kAngleSamplesPerSpan * (knots.control_point_count() - knots.degree());
+
   double worst = 0;
   for (int k = 0; k <= count; ++k) {
     const double s = static_cast<double>(k) / count;
@@ -95,6 +97,7 @@ JunctionMove smooth_one(const SurfaceNetwork& network, int region, double clean_
     move.refused = junction.error().message();
     return move;
   }
+
   const JunctionLayout layout = present_layout(*junction, network);
   JunctionNet start = present_net(*junction, layout, network);
   const Points3 before = junction_normals(junction->topology, start);
@@ -103,12 +106,15 @@ JunctionMove smooth_one(const SurfaceNetwork& network, int region, double clean_
     move.refused = "the equations of its edges cannot be solved";
     return move;
   }
+
+  // How far the surface turned stands in for the distance from a target, of which there is none.
   JunctionQuality quality = junction_quality(junction->topology, smooth.net);
   const Points3 after = junction_normals(junction->topology, smooth.net);
   for (Eigen::Index k = 0; k < before.cols(); ++k) {
     quality.normal_off_target_deg =
         std::max(quality.normal_off_target_deg, angle_deg(before.col(k), after.col(k)));
   }
+
   if (quality.normal_off_target_deg > kMostTurnDeg) {
     move.refused = fmt::format("its surface would turn by {:.3g} degrees, at most {} is allowed",
                                quality.normal_off_target_deg, kMostTurnDeg);
@@ -119,6 +125,8 @@ JunctionMove smooth_one(const SurfaceNetwork& network, int region, double clean_
         fmt::format("{:.3g} degrees remain between its patches", quality.worst_angle_deg);
   }
   if (!move.refused.empty()) return move;
+
+  // Back from the junction's own unit and place.
   move.columns = junction->columns;
   move.points_mm = (junction->radius_mm * smooth.net.points).colwise() + junction->center_mm;
   return move;
@@ -142,11 +150,16 @@ class Smoother {
       result_.parts.push_back(std::move(part));
       wanted_.push_back(options_.everything || !(before[r] <= options_.clean_deg));
     }
+
+    // Bodies first: junctions hold their openings as bodies leave them.
     mend_bodies();
     if (!smooth_junctions()) return fail(cancelled("smooth junctions"));
+
     const std::vector<double> after = angles.measure();
     for (std::size_t r = 0; r < after.size(); ++r) result_.parts[r].after_deg = after[r];
     measure_moves(start);
+
+    // What was moved and is still not smooth is refused all the same.
     for (SmoothedPart& part : result_.parts) {
       result_.before_deg = std::max(result_.before_deg, part.before_deg);
       result_.after_deg = std::max(result_.after_deg, part.after_deg);
@@ -181,6 +194,8 @@ class Smoother {
       if (wanted_[index(r)] && network().regions[index(r)].kind == RegionKind::kJunction)
         work.push_back(r);
     }
+
+    // Junctions share no point that moves, so they are solved side by side and written in order.
     std::vector<JunctionMove> moves(work.size());
     std::atomic<std::size_t> done{0};
     tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
@@ -190,6 +205,7 @@ class Smoother {
                    static_cast<double>(++done) / static_cast<double>(work.size()));
     });
     if (progress_.should_stop()) return false;
+
     for (std::size_t k = 0; k < work.size(); ++k) {
       SmoothedPart& part = result_.parts[index(work[k])];
       part.outcome = moves[k].refused.empty() ? Outcome::kSmoothed : Outcome::kRefused;

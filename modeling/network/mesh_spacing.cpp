@@ -9,41 +9,45 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "base/index.h"
 #include "kernel/evaluate/grid.h"
+#include "modeling/network/rules.h"
 
 namespace angiospline {
 namespace {
 
-// Flat places are not wide vessels: the local radius is at most this many radii of the region.
-constexpr double kMostRadii = 8;
-constexpr int kSamplesPerSpan = 6;
+using namespace network_rules;
 
 std::vector<double> samples_of_spans(const KnotVector& knots) {
   std::vector<double> samples;
   const std::vector<double> breaks = knots.breakpoints();
   for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
-    for (int k = 0; k < kSamplesPerSpan; ++k) {
-      samples.push_back(breaks[i] + (breaks[i + 1] - breaks[i]) * k / kSamplesPerSpan);
+    for (int k = 0; k < kSpacingSamples; ++k) {
+      samples.push_back(breaks[i] + (breaks[i + 1] - breaks[i]) * k / kSpacingSamples);
     }
   }
   samples.push_back(breaks.back());
   return samples;
 }
 
-// Segments wanted for each unit of u and of v at one point with these derivatives.
+// Segments wanted (Filip, Magedson, Markot 1986, with the second derivatives of this one point)
+// for each unit of u and of v at one point with these derivatives.
 Vec2 wanted(const Vec3& su, const Vec3& sv, const Vec3& suu, const Vec3& suv, const Vec3& svv,
             double radius_mm, const TessellationOptions& options) {
   const Vec3 cross = su.cross(sv);
   const double lu = su.norm();
   const double lv = sv.norm();
   // Where the patch is singular the whole second derivative stands in for its normal part.
-  const bool regular = cross.norm() > 1e-9 * lu * lv;
+  const bool regular = cross.norm() > kSingularNormal * lu * lv;
   const Vec3 n = regular ? Vec3(cross.normalized()) : Vec3::Zero();
   const auto normal_part = [&](const Vec3& d) { return regular ? std::abs(n.dot(d)) : d.norm(); };
+
   // The twist is shared out by 2 hu hv <= hu^2 lu / lv + hv^2 lv / lu.
   const double twist = normal_part(suv);
   const double uu = normal_part(suu) + (lv > 0 ? twist * lu / lv : 0);
   const double vv = normal_part(svv) + (lu > 0 ? twist * lv / lu : 0);
+
+  // What counts as local: the vessel's radius, or the surface's own where it is flatter.
   double local_mm = radius_mm;
   if (lu > 0 && lv > 0) {
     const double curvature = std::max(uu / (lu * lu), vv / (lv * lv));
@@ -54,6 +58,7 @@ Vec2 wanted(const Vec3& su, const Vec3& sv, const Vec3& suu, const Vec3& suv, co
   const double tolerance_mm =
       std::min(options.chord_tolerance * local_mm, options.chord_tolerance_mm);
   const double longest_mm = options.longest_edge * local_mm;
+
   // Each direction may spend half the tolerance, and what the longest edge keeps the other from
   // spending: a straight tube needs it all for its round.
   const auto spent = [&](double second, double speed) {
@@ -91,7 +96,9 @@ std::vector<double> equidistribute(const std::vector<double>& density, int least
     sum[i] = sum[i - 1] + 0.5 * (density[i - 1] + density[i]) / static_cast<double>(steps);
   }
   // The hair taken off keeps a count from depending on the last bit of a symmetric shape.
-  const int count = std::max(least, static_cast<int>(std::ceil(sum.back() - 1e-6)));
+  const int count = std::max(least, static_cast<int>(std::ceil(sum.back() - kSegmentHair)));
+
+  // Where the integral reaches k / count of all, linear between two sums.
   std::vector<double> samples{0.0};
   std::size_t i = 1;
   for (int k = 1; k < count; ++k) {
@@ -112,6 +119,8 @@ PatchSpacing spacing_of(const BSplineSurface<3>& surface, double radius_mm,
   const std::vector<double>& vs = spacing.v.parameters;
   spacing.u.values.assign(us.size(), 0.0);
   spacing.v.values.assign(vs.size(), 0.0);
+
+  // A grid line is as dense as its most demanding point.
   const SurfaceGrid<3> grid = evaluate_grid(surface, us, vs, 2);
   for (std::size_t i = 0; i < us.size(); ++i) {
     for (std::size_t j = 0; j < vs.size(); ++j) {
@@ -128,9 +137,7 @@ PatchSpacing spacing_of(const BSplineSurface<3>& surface, double radius_mm,
 
 namespace {
 
-// Tolerances are coarsened to so many digits, upward.
-constexpr int kToleranceDigits = 2;
-
+// To kToleranceDigits.
 double rounded_up(double value) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)) + 1 - kToleranceDigits);
   return std::ceil(value / unit) * unit;
@@ -150,7 +157,7 @@ double fallback_radius_mm(const SurfaceNetwork& network) {
   for (const Region& region : network.regions) radius = std::max(radius, region.radius_mm);
   if (radius > 0) return radius;
   const Points3& p = network.control_points_mm;
-  return 0.05 * (p.rowwise().maxCoeff() - p.rowwise().minCoeff()).norm();
+  return kFallbackRadius * (p.rowwise().maxCoeff() - p.rowwise().minCoeff()).norm();
 }
 
 std::vector<PatchSpacing> spacings_of(const SurfaceNetwork& network,
@@ -160,8 +167,7 @@ std::vector<PatchSpacing> spacings_of(const SurfaceNetwork& network,
   std::vector<PatchSpacing> spacings;
   spacings.reserve(surfaces.size());
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
-    const double known =
-        network.regions[static_cast<std::size_t>(network.patches[p].region)].radius_mm;
+    const double known = network.regions[index(network.patches[p].region)].radius_mm;
     spacings.push_back(spacing_of(surfaces[p], known > 0 ? known : fallback, options));
   }
   return spacings;
@@ -173,8 +179,7 @@ double triangle_estimate(const SurfaceNetwork& network, const std::vector<PatchS
   for (const Rim& rim : network.rims) {
     double segments = 0;
     for (const Side& side : rim.sides) {
-      const Density& density =
-          density_along(spacings[static_cast<std::size_t>(side.patch)], side.side);
+      const Density& density = density_along(spacings[index(side.patch)], side.side);
       const double width = density.parameters.back() - density.parameters.front();
       segments += density.integral() * (side.to - side.from) / width + 1;
     }
@@ -206,17 +211,18 @@ Result<NetworkSpacing> spacing_of(const SurfaceNetwork& network,
   const double asked = triangle_estimate(network, result.patches);
   double estimate = asked;
   double factor = 1;
+
   // Triangles fall no faster than the tolerance grows, so no step goes too far; three lines a patch
   // stay whatever the tolerance is.
-  constexpr int kTries = 24;
-  for (int k = 0; k < kTries && !(estimate <= options.most_triangles); ++k) {
+  for (int k = 0; k < kCoarseningTries && !(estimate <= options.most_triangles); ++k) {
     if (progress.should_stop()) return fail(cancelled("tessellate"));
-    factor *= std::max(estimate / options.most_triangles, 1.01);
+    factor *= std::max(estimate / options.most_triangles, kLeastCoarsening);
     factor = rounded_up(options.chord_tolerance * factor) / options.chord_tolerance;
     result.used = coarser(options, factor);
     result.patches = spacings_of(network, surfaces, result.used);
     estimate = triangle_estimate(network, result.patches);
   }
+
   const bool fits = estimate <= options.most_triangles;
   if (asked <= options.most_triangles || (fits && options.coarsen)) return result;
   return fail(too_many(asked, result.used, fits));

@@ -8,6 +8,8 @@
 
 #include "base/index.h"
 #include "kernel/evaluate/grid.h"
+#include "modeling/network/tessellation_draft.h"
+#include "modeling/solid/rules.h"
 
 namespace angiospline {
 namespace {
@@ -16,7 +18,7 @@ struct GridLines {
   std::vector<double> us, vs;
 };
 
-constexpr int kTurnSamples = 4;  // a span
+using namespace solid_rules;
 
 std::vector<double> divided(const std::vector<double>& breaks, const std::vector<int>& intervals) {
   std::vector<double> lines{breaks.front()};
@@ -46,11 +48,11 @@ std::vector<int> intervals_for(const Points3& tangents, int along, int across, i
       }
       largest = std::max(largest, turn);
     }
-    constexpr int kMostIntervals = 64;
     result[index(s)] =
         options.finer *
         std::clamp(static_cast<int>(std::ceil(largest / options.turn_rad)), 1, kMostIntervals);
   }
+
   if (spans == 1 && result[0] < 2) result[0] = 2;  // so that there is a point inside
   return result;
 }
@@ -69,17 +71,12 @@ GridLines grid_lines(const BSplineSurface<3>& patch, const BoundaryMeshOptions& 
                                           grid.v_count, options))};
 }
 
-struct ChainPoint {
-  double parameter;
-  int point;
-};
-using Chain = std::vector<ChainPoint>;
-
 class Mesher {
  public:
   Mesher(const BoundaryModel& model, const std::vector<int>& faces,
          const BoundaryMeshOptions& options)
       : model_(model), faces_(faces), lines_(model.faces.size()), uses_(model.faces.size()) {
+    // Whole patches get a grid of parameter lines, as dense as their tangents turn.
     std::vector<bool> wanted(model.faces.size(), false);
     for (const int f : faces) wanted[index(f)] = true;
     for (const int f : faces) {
@@ -87,6 +84,7 @@ class Mesher {
         lines_[index(f)] = grid_lines(*model.faces[index(f)].patch, options);
       }
     }
+
     std::vector<int> edges;
     for (std::size_t e = 0; e < model.edges.size(); ++e) {
       const BoundaryEdge& edge = model.edges[e];
@@ -99,6 +97,7 @@ class Mesher {
       }
       if (is_used) edges.push_back(static_cast<int>(e));
     }
+
     for (const int e : edges) divide_edge(e, wanted);
   }
 
@@ -144,16 +143,18 @@ class Mesher {
       std::vector<double> ts;
       for (const double p : along_v ? lines.vs : lines.us) {
         const double s = (p - use.side_from) / (use.side_to - use.side_from);
-        if (s > 1e-9 && s < 1 - 1e-9) ts.push_back(edge.from + s * (edge.to - edge.from));
+        if (s > kEdgeMargin && s < 1 - kEdgeMargin)
+          ts.push_back(edge.from + s * (edge.to - edge.from));
       }
       if (ts.size() > inner.size()) inner = std::move(ts);
     }
     std::sort(inner.begin(), inner.end());
-    Chain chain;
+
+    MeshChain chain;
     const auto at = [&](double t) { return edge.point(t).at; };
-    chain.push_back({edge.from, vertex_point(edge.first_vertex, at(edge.from))});
-    for (const double t : inner) chain.push_back({t, add_point(at(t))});
-    chain.push_back({edge.to, vertex_point(edge.last_vertex, at(edge.to))});
+    chain.push(edge.from, vertex_point(edge.first_vertex, at(edge.from)));
+    for (const double t : inner) chain.push(t, add_point(at(t)));
+    chain.push(edge.to, vertex_point(edge.last_vertex, at(edge.to)));
     chains_[number] = std::move(chain);
   }
 
@@ -164,47 +165,40 @@ class Mesher {
     result_.face_of.push_back(face);
   }
 
-  // The points of one side in growing parameter.
-  Chain side_chain(int face, PatchSide side) const {
-    std::vector<Chain> pieces;
+  // The points of one side in growing parameter: of its edges one after another, each one's first
+  // point being the last one's end.
+  MeshChain side_chain(int face, PatchSide side) const {
+    std::vector<MeshChain> pieces;
     for (const FaceUse& fu : uses_[index(face)]) {
       const BoundaryEdge& edge = model_.edges[index(fu.edge)];
       const EdgeUse& use = edge.uses[index(fu.use)];
       if (use.side != side) continue;
-      Chain piece = chains_.at(fu.edge);
-      for (ChainPoint& p : piece) {
-        const double s = (p.parameter - edge.from) / (edge.to - edge.from);
-        p.parameter = use.side_from + s * (use.side_to - use.side_from);
+      MeshChain piece = chains_.at(fu.edge);
+      for (double& t : piece.at) {
+        const double s = (t - edge.from) / (edge.to - edge.from);
+        t = use.side_from + s * (use.side_to - use.side_from);
       }
-      if (use.side_from > use.side_to) std::reverse(piece.begin(), piece.end());
+      if (use.side_from > use.side_to) {
+        std::reverse(piece.at.begin(), piece.at.end());
+        std::reverse(piece.points.begin(), piece.points.end());
+      }
       pieces.push_back(std::move(piece));
     }
-    std::sort(pieces.begin(), pieces.end(), [](const Chain& a, const Chain& b) {
-      return a.front().parameter < b.front().parameter;
-    });
-    Chain chain;
-    for (const Chain& piece : pieces) {
-      chain.insert(chain.end(), piece.begin() + (chain.empty() ? 0 : 1), piece.end());
+
+    std::sort(pieces.begin(), pieces.end(),
+              [](const MeshChain& a, const MeshChain& b) { return a.at.front() < b.at.front(); });
+    MeshChain chain;
+    for (const MeshChain& piece : pieces) {
+      for (std::size_t k = chain.at.empty() ? 0 : 1; k < piece.at.size(); ++k) {
+        chain.push(piece.at[k], piece.points[k]);
+      }
     }
     return chain;
   }
 
   // Triangles between a side's points and the grid line next to it.
-  void add_strip(const Chain& outer, const Chain& inner, int face, bool flipped) {
-    std::size_t i = 0, j = 0;
-    while (i + 1 < outer.size() || j + 1 < inner.size()) {
-      const bool advance_outer =
-          j + 1 == inner.size() ||
-          (i + 1 < outer.size() && outer[i + 1].parameter + outer[i].parameter <=
-                                       inner[j + 1].parameter + inner[j].parameter);
-      if (advance_outer) {
-        add_triangle(outer[i].point, outer[i + 1].point, inner[j].point, face, flipped);
-        ++i;
-      } else {
-        add_triangle(outer[i].point, inner[j + 1].point, inner[j].point, face, flipped);
-        ++j;
-      }
-    }
+  void add_strip(const MeshChain& outer, const MeshChain& inner, int face, bool flipped) {
+    zip_chains(outer, inner, [&](int a, int b, int c) { add_triangle(a, b, c, face, flipped); });
   }
 
   void mesh_patch(int number) {
@@ -215,6 +209,7 @@ class Mesher {
     const SurfaceGrid<3> grid = evaluate_grid(*face.patch, us, vs, 0);
     const int first = static_cast<int>(points_.size());
     for (Eigen::Index k = 0; k < grid.points().cols(); ++k) add_point(grid.points().col(k));
+
     const int nu = static_cast<int>(us.size()), nv = static_cast<int>(vs.size());
     const auto at = [&](int i, int j) { return first + i * nv + j; };
     for (int i = 0; i + 1 < nu; ++i) {
@@ -223,15 +218,17 @@ class Mesher {
         add_triangle(at(i, j), at(i + 1, j + 1), at(i, j + 1), number, face.reversed);
       }
     }
-    Chain low_u, high_u, low_v, high_v;
+
+    MeshChain low_u, high_u, low_v, high_v;
     for (int j = 0; j < nv; ++j) {
-      low_u.push_back({vs[index(j)], at(0, j)});
-      high_u.push_back({vs[index(j)], at(nu - 1, j)});
+      low_u.push(vs[index(j)], at(0, j));
+      high_u.push(vs[index(j)], at(nu - 1, j));
     }
     for (int i = 0; i < nu; ++i) {
-      low_v.push_back({us[index(i)], at(i, 0)});
-      high_v.push_back({us[index(i)], at(i, nv - 1)});
+      low_v.push(us[index(i)], at(i, 0));
+      high_v.push(us[index(i)], at(i, nv - 1));
     }
+
     // Along v0 and u1 the inside lies to the left.
     add_strip(side_chain(number, PatchSide::kV0), low_v, number, face.reversed);
     add_strip(side_chain(number, PatchSide::kU1), high_u, number, face.reversed);
@@ -249,13 +246,15 @@ class Mesher {
     std::multimap<int, std::size_t> by_start;
     for (const FaceUse& fu : uses_[index(number)]) {
       Piece piece;
-      for (const ChainPoint& p : chains_.at(fu.edge)) piece.points.push_back(p.point);
+      piece.points = chains_.at(fu.edge).points;
       if (!model_.edges[index(fu.edge)].uses[index(fu.use)].forward) {
         std::reverse(piece.points.begin(), piece.points.end());
       }
       by_start.emplace(piece.points.front(), pieces.size());
       pieces.push_back(std::move(piece));
     }
+
+    // From each piece on to one that starts where it ends, until none is left that does.
     std::vector<std::vector<int>> polygons;
     for (Piece& start : pieces) {
       if (start.taken) continue;
@@ -281,6 +280,8 @@ class Mesher {
     for (const std::vector<int>& polygon : polygons_of(number)) {
       Vec3 middle = Vec3::Zero();
       for (const int p : polygon) middle += points_[index(p)] / static_cast<double>(polygon.size());
+
+      // A fan about the middle, unless it would turn over somewhere.
       bool is_star = true;
       for (std::size_t k = 0; k < polygon.size(); ++k) {
         const Vec3 a = points_[index(polygon[k])] - middle;
@@ -298,7 +299,8 @@ class Mesher {
     }
   }
 
-  // Quadratic, but only for caps that are not star-shaped.
+  // Cuts off a corner with nothing inside it again and again (Meisters 1975). Cubic at worst, but
+  // only for caps that are not star-shaped.
   void clip_ears(std::vector<int> polygon, const Vec3& normal, int number) {
     const auto turn = [&](int a, int b, int c) {
       return (points_[index(b)] - points_[index(a)])
@@ -330,7 +332,7 @@ class Mesher {
   const std::vector<int>& faces_;
   std::vector<GridLines> lines_;
   std::vector<std::vector<FaceUse>> uses_;
-  std::map<int, Chain> chains_;
+  std::map<int, MeshChain> chains_;
   std::map<int, int> vertices_;
   std::vector<Vec3> points_;
   BoundaryMesh result_;
@@ -374,11 +376,13 @@ double chord_height_mm(const BoundaryModel& model, int number, const BoundaryMes
   if (model.mesh_points.cols() > 0) return model.mesh_deflection_mm;
   if (!face.is_whole) return 0.0;
   const GridLines lines = grid_lines(*face.patch, options);
+
   const auto middles = [](const std::vector<double>& a) {
     std::vector<double> result;
     for (std::size_t k = 0; k + 1 < a.size(); ++k) result.push_back(0.5 * (a[k] + a[k + 1]));
     return result;
   };
+
   const SurfaceGrid<3> corners = evaluate_grid(*face.patch, lines.us, lines.vs, 0);
   const SurfaceGrid<3> centers =
       evaluate_grid(*face.patch, middles(lines.us), middles(lines.vs), 0);

@@ -2,21 +2,10 @@
 
 #include "base/index.h"
 #include "modeling/network/network_topology.h"
+#include "modeling/solid/rules.h"
 
 namespace angiospline {
 namespace {
-
-FaceKind kind_of(RimKind kind) {
-  switch (kind) {
-    case RimKind::kInlet:
-      return FaceKind::kInlet;
-    case RimKind::kOutlet:
-      return FaceKind::kOutlet;
-    case RimKind::kCap:
-      break;
-  }
-  return FaceKind::kCap;
-}
 
 EdgeUse use_of(const NetworkEdge& edge, int use) {
   EdgeUse result;
@@ -51,9 +40,8 @@ std::pair<Vec3, Vec3> plane_of(const Rim& rim, const std::vector<LoopEdge>& loop
   Vec3 area = Vec3::Zero();
   for (const LoopEdge& step : loop) {
     const BoundaryEdge& edge = edges[index(step.edge)];
-    constexpr int kChords = 16;
-    for (int k = 0; k < kChords; ++k) {
-      const double h = (edge.to - edge.from) / kChords;
+    for (int k = 0; k < solid_rules::kLoopChords; ++k) {
+      const double h = (edge.to - edge.from) / solid_rules::kLoopChords;
       const Vec3 a = edge.point(edge.from + k * h).at - rim.center_mm;
       const Vec3 b = edge.point(edge.from + (k + 1) * h).at - rim.center_mm;
       area += (step.forward ? 0.5 : -0.5) * a.cross(b);
@@ -76,6 +64,18 @@ Vec2 side_parameters(const BSplineSurface<3>& patch, PatchSide side, double t) {
       break;
   }
   return {t, patch.v().last()};
+}
+
+FaceKind face_kind(RimKind kind) {
+  switch (kind) {
+    case RimKind::kInlet:
+      return FaceKind::kInlet;
+    case RimKind::kOutlet:
+      return FaceKind::kOutlet;
+    case RimKind::kCap:
+      break;
+  }
+  return FaceKind::kCap;
 }
 
 BSplineCurve<3> side_curve(const BSplineSurface<3>& patch, PatchSide side) {
@@ -118,6 +118,8 @@ Result<BoundaryModel> boundary_of(const SurfaceNetwork& network) {
   model.vertex_count = static_cast<int>(topology.vertices_mm.cols());
   model.solids = model.shells = topology.component_count;
   for (int c = 0; c < topology.component_count; ++c) model.shell_solids.push_back(c);
+
+  // A face for each patch, whole, its edges along its sides.
   for (std::size_t p = 0; p < network.patches.size(); ++p) {
     const Region& region = network.regions[index(network.patches[p].region)];
     BoundaryFace face;
@@ -134,11 +136,13 @@ Result<BoundaryModel> boundary_of(const SurfaceNetwork& network) {
       model.edges[index(step.edge)].uses[index(step.use)].forward = step.forward;
     }
   }
+
+  // A plane face for each rim.
   for (std::size_t r = 0; r < network.rims.size(); ++r) {
     const Rim& rim = network.rims[r];
     BoundaryFace face;
     face.name = rim.name;
-    face.kind = kind_of(rim.kind);
+    face.kind = face_kind(rim.kind);
     face.radius_mm = rim.radius_mm;
     face.shell = topology.components[index(rim.sides.front().patch)];
     face.plane = plane_of(rim, topology.rim_loops[r], model.edges);

@@ -31,15 +31,13 @@
 
 #include "base/index.h"
 #include "modeling/solid/occt_bspline.h"
+#include "modeling/solid/rules.h"
 #include "modeling/solid/solid_shape.h"
 
 namespace angiospline {
 namespace {
 
-// Parameters count as equal within this share of the domain: files keep 15 digits.
-constexpr double kParameterTolerance = 1e-9;
-// Panels for curves that are not splines.
-constexpr int kPanels = 8;
+using namespace solid_rules;
 
 Vec3 vec(const gp_XYZ& p) { return {p.X(), p.Y(), p.Z()}; }
 
@@ -62,11 +60,12 @@ struct Domain {
 // The side of the patch on which a parameter curve lies from `from` to `to`, running affinely.
 bool find_side(const Geom2d_Curve& curve, double from, double to, const Domain& domain,
                EdgeUse& use) {
-  constexpr int kPoints = 5;
-  std::array<gp_Pnt2d, kPoints> points;
-  for (int k = 0; k < kPoints; ++k) {
-    points[index(k)] = curve.Value(from + (to - from) * k / (kPoints - 1));
+  std::array<gp_Pnt2d, kSidePoints> points;
+  for (int k = 0; k < kSidePoints; ++k) {
+    points[index(k)] = curve.Value(from + (to - from) * k / (kSidePoints - 1));
   }
+
+  // All points on one of the four parameter lines around the domain.
   const double eps_u = kParameterTolerance * (domain.u1 - domain.u0);
   const double eps_v = kParameterTolerance * (domain.v1 - domain.v0);
   const auto all_at = [&](bool u, double value, double eps) {
@@ -86,22 +85,26 @@ bool find_side(const Geom2d_Curve& curve, double from, double to, const Domain& 
   } else {
     return false;
   }
+
+  // And evenly spaced along it, so that a parameter of the edge is one of the side.
   const bool along_v = use.side == PatchSide::kU0 || use.side == PatchSide::kU1;
   const auto along = [&](int k) { return along_v ? points[index(k)].Y() : points[index(k)].X(); };
   const double low = along_v ? domain.v0 : domain.u0;
   const double high = along_v ? domain.v1 : domain.u1;
   const double eps = along_v ? eps_v : eps_u;
-  for (int k = 1; k + 1 < kPoints; ++k) {
-    const double affine = along(0) + (along(kPoints - 1) - along(0)) * k / (kPoints - 1);
+  for (int k = 1; k + 1 < kSidePoints; ++k) {
+    const double affine = along(0) + (along(kSidePoints - 1) - along(0)) * k / (kSidePoints - 1);
     if (std::abs(along(k) - affine) > eps) return false;
   }
+
+  // Ends that mean the domain's become the domain's.
   const auto snapped = [&](double t) {
     if (std::abs(t - low) <= eps) return low;
     if (std::abs(t - high) <= eps) return high;
     return t;
   };
   use.side_from = snapped(along(0));
-  use.side_to = snapped(along(kPoints - 1));
+  use.side_to = snapped(along(kSidePoints - 1));
   use.on_side = true;
   return true;
 }
@@ -119,11 +122,13 @@ class BoundaryBuilder {
     model_.vertex_count = vertices.Extent();
     model_.edges.resize(index(edges_.Extent()));
     for (int e = 1; e <= edges_.Extent(); ++e) add_edge(TopoDS::Edge(edges_(e)), vertices);
+
     collect(shape_, -1, -1);
     for (std::size_t f = 0; f < faces_.size(); ++f) {
-      if (f % 64 == 0 && progress_.should_stop()) return fail(cancelled("measure"));
+      if (f % kStopEvery == 0 && progress_.should_stop()) return fail(cancelled("measure"));
       add_face(static_cast<int>(f));
     }
+
     if (needs_mesh_) add_mesh();
     if (progress_.should_stop()) return fail(cancelled("measure"));
     model_.is_sound = BRepCheck_Analyzer(shape_, true, true).IsValid();
@@ -137,6 +142,8 @@ class BoundaryBuilder {
     TopExp::Vertices(TopoDS::Edge(edge.Oriented(TopAbs_FORWARD)), first, last);
     if (!first.IsNull()) result.first_vertex = vertices.FindIndex(first) - 1;
     if (!last.IsNull()) result.last_vertex = vertices.FindIndex(last) - 1;
+
+    // An edge without a curve is a point, as at the pole of a sphere.
     TopLoc_Location place;
     const Handle(Geom_Curve) curve = BRep_Tool::Curve(edge, place, result.from, result.to);
     result.is_degenerate = BRep_Tool::Degenerated(edge) || curve.IsNull();
@@ -145,6 +152,8 @@ class BoundaryBuilder {
       result.breaks = {result.from, result.to};
       return;
     }
+
+    // A polynomial spline that was not moved is taken over; anything else keeps its evaluator.
     const gp_Trsf trsf = place.Transformation();
     auto spline = Handle(Geom_BSplineCurve)::DownCast(curve);
     if (!spline.IsNull()) {
@@ -187,6 +196,14 @@ class BoundaryBuilder {
     for (TopoDS_Iterator part(shape); part.More(); part.Next()) collect(part.Value(), solid, shell);
   }
 
+  // The surface as ours, if it is a polynomial spline with clamped ends.
+  static std::shared_ptr<const BSplineSurface<3>> patch_of(const Handle(Geom_Surface) & surface) {
+    const auto spline = Handle(Geom_BSplineSurface)::DownCast(surface);
+    if (spline.IsNull() || spline->IsUPeriodic() || spline->IsVPeriodic()) return nullptr;
+    auto own = from_occt(*spline);
+    return own ? std::make_shared<BSplineSurface<3>>(*std::move(own)) : nullptr;
+  }
+
   void add_face(int number) {
     const TopoDS_Face& shape = faces_[index(number)];
     BoundaryFace& face = model_.faces[index(number)];
@@ -195,21 +212,16 @@ class BoundaryBuilder {
       face.kind = solid_.faces[index(number)].kind;
       face.radius_mm = solid_.faces[index(number)].radius_mm;
     }
+
     face.reversed = shape.Orientation() == TopAbs_REVERSED;
     TopLoc_Location place;
     Handle(Geom_Surface) surface = BRep_Tool::Surface(shape, place);
     while (surface->IsKind(STANDARD_TYPE(Geom_RectangularTrimmedSurface))) {
       surface = Handle(Geom_RectangularTrimmedSurface)::DownCast(surface)->BasisSurface();
     }
+    if (place.IsIdentity()) face.patch = patch_of(surface);
+
     const gp_Trsf trsf = place.Transformation();
-    if (place.IsIdentity()) {
-      const auto spline = Handle(Geom_BSplineSurface)::DownCast(surface);
-      if (!spline.IsNull() && !spline->IsUPeriodic() && !spline->IsVPeriodic()) {
-        if (auto own = from_occt(*spline)) {
-          face.patch = std::make_shared<BSplineSurface<3>>(*std::move(own));
-        }
-      }
-    }
     const auto plane = Handle(Geom_Plane)::DownCast(surface);
     if (!plane.IsNull()) {
       const gp_Pln at = plane->Pln().Transformed(trsf);
@@ -217,6 +229,7 @@ class BoundaryBuilder {
       if (face.reversed) normal = -normal;
       face.plane = {vec(at.Location().XYZ()), normal};
     }
+
     face.jet = [surface, trsf](double u, double v) {
       gp_Pnt s;
       gp_Vec su, sv, suu, svv, suv;
@@ -225,10 +238,12 @@ class BoundaryBuilder {
       return SurfaceJet{transformed(trsf, s), vec(su.XYZ()),  vec(sv.XYZ()),
                         vec(suu.XYZ()),       vec(suv.XYZ()), vec(svv.XYZ())};
     };
+
     add_uses(number, surface);
     complete_face(number, surface);
   }
 
+  // The edges around a face, and whether they are just the sides of its whole patch.
   void add_uses(int number, const Handle(Geom_Surface) & surface) {
     const TopoDS_Face& shape = faces_[index(number)];
     BoundaryFace& face = model_.faces[index(number)];
@@ -242,37 +257,45 @@ class BoundaryBuilder {
       for (TopExp_Explorer at(wire.Current(), TopAbs_EDGE); at.More(); at.Next()) {
         const TopoDS_Edge edge = TopoDS::Edge(at.Current());
         BoundaryEdge& result = model_.edges[index(edges_.FindIndex(edge)) - 1];
-        EdgeUse use;
-        use.face = number;
-        use.forward = edge.Orientation() != TopAbs_REVERSED;
-        double from = 0, to = 0;
-        // Not of plane faces without one: none are made up.
-        const Handle(Geom2d_Curve) curve =
-            face.plane ? Handle(Geom2d_Curve)() : BRep_Tool::CurveOnSurface(edge, shape, from, to);
-        if (!curve.IsNull()) {
-          const double edge_from = result.from;
-          const double rate = (to - from) / (result.to - result.from);
-          if (!all_on_sides || !find_side(*curve, from, to, domain, use)) all_on_sides = false;
-          if (use.on_side) {
-            const bool along_v = use.side == PatchSide::kU0 || use.side == PatchSide::kU1;
-            covered += std::abs(use.side_to - use.side_from) /
-                       (along_v ? domain.v1 - domain.v0 : domain.u1 - domain.u0);
-          }
-          use.parameters = [curve, from, edge_from, rate](double t) {
-            gp_Pnt2d p;
-            gp_Vec2d d;
-            curve->D1(from + (t - edge_from) * rate, p, d);
-            return EdgePoint<Vec2>{{p.X(), p.Y()}, {d.X() * rate, d.Y() * rate}};
-          };
-        } else {
-          all_on_sides = false;
+        EdgeUse use = use_of(edge, result, number, all_on_sides, domain);
+        all_on_sides = all_on_sides && use.on_side;
+        if (use.on_side) {
+          const bool along_v = use.side == PatchSide::kU0 || use.side == PatchSide::kU1;
+          covered += std::abs(use.side_to - use.side_from) /
+                     (along_v ? domain.v1 - domain.v0 : domain.u1 - domain.u0);
         }
         result.uses.push_back(std::move(use));
       }
     }
-    face.is_whole = all_on_sides && face.loops == 1 && std::abs(covered - 4) <= 1e-6;
+
+    face.is_whole = all_on_sides && face.loops == 1 && std::abs(covered - 4) <= kPerimeterSlack;
     needs_mesh_ = needs_mesh_ || !(face.is_whole || (face.plane && face.loops == 1));
     if (!face.is_whole) face.patch = nullptr;  // a trimmed one is measured through its evaluator
+  }
+
+  // How an edge lies on a face; its side is looked for only while the face may still be whole.
+  EdgeUse use_of(const TopoDS_Edge& edge, const BoundaryEdge& of, int number, bool may_be_whole,
+                 const Domain& domain) const {
+    EdgeUse use;
+    use.face = number;
+    use.forward = edge.Orientation() != TopAbs_REVERSED;
+    // Not of plane faces without one: none are made up.
+    if (model_.faces[index(number)].plane) return use;
+    double from = 0, to = 0;
+    const Handle(Geom2d_Curve) curve =
+        BRep_Tool::CurveOnSurface(edge, faces_[index(number)], from, to);
+    if (curve.IsNull()) return use;
+
+    if (may_be_whole) find_side(*curve, from, to, domain, use);
+    const double edge_from = of.from;
+    const double rate = (to - from) / (of.to - of.from);
+    use.parameters = [curve, from, edge_from, rate](double t) {
+      gp_Pnt2d p;
+      gp_Vec2d d;
+      curve->D1(from + (t - edge_from) * rate, p, d);
+      return EdgePoint<Vec2>{{p.X(), p.Y()}, {d.X() * rate, d.Y() * rate}};
+    };
+    return use;
   }
 
   // What measuring a trimmed face in its parameters needs, and its box (1e-7 mm too large).
@@ -301,33 +324,61 @@ class BoundaryBuilder {
     Bnd_Box box;
     BRepBndLib::Add(shape_, box, false);
     const double size = box.IsVoid() ? 1.0 : std::sqrt(box.SquareExtent());
-    model_.mesh_deflection_mm = 2e-3 * size;
-    constexpr double kAngularDeflection = 0.3;  // radians
+    model_.mesh_deflection_mm = kMeshDeflection * size;
     const TopoDS_Shape copy = BRepBuilderAPI_Copy(shape_, false, false).Shape();
-    BRepMesh_IncrementalMesh(copy, model_.mesh_deflection_mm, false, kAngularDeflection, true);
-    TopTools_IndexedMapOfShape vertices, edges;
-    TopExp::MapShapes(copy, TopAbs_VERTEX, vertices);
-    TopExp::MapShapes(copy, TopAbs_EDGE, edges);
-    std::vector<Vec3> points;
-    for (int v = 1; v <= vertices.Extent(); ++v) {
-      points.push_back(vec(BRep_Tool::Pnt(TopoDS::Vertex(vertices(v))).XYZ()));
+    BRepMesh_IncrementalMesh(copy, model_.mesh_deflection_mm, false, kMeshAngle, true);
+
+    SharedPoints shared;
+    TopExp::MapShapes(copy, TopAbs_VERTEX, shared.vertices);
+    TopExp::MapShapes(copy, TopAbs_EDGE, shared.edges);
+    shared.of_edge.resize(index(shared.edges.Extent()));
+    for (int v = 1; v <= shared.vertices.Extent(); ++v) {
+      shared.points.push_back(vec(BRep_Tool::Pnt(TopoDS::Vertex(shared.vertices(v))).XYZ()));
     }
-    std::vector<std::vector<int>> edge_points(index(edges.Extent()));
     std::size_t number = 0;
     for (TopExp_Explorer f(copy, TopAbs_FACE); f.More(); f.Next(), ++number) {
-      add_face_mesh(TopoDS::Face(f.Current()), model_.faces[number], vertices, edges, edge_points,
-                    points);
+      add_face_mesh(TopoDS::Face(f.Current()), model_.faces[number], shared);
     }
-    model_.mesh_points.resize(3, static_cast<Eigen::Index>(points.size()));
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      model_.mesh_points.col(static_cast<Eigen::Index>(k)) = points[k];
+
+    model_.mesh_points.resize(3, static_cast<Eigen::Index>(shared.points.size()));
+    for (std::size_t k = 0; k < shared.points.size(); ++k) {
+      model_.mesh_points.col(static_cast<Eigen::Index>(k)) = shared.points[k];
     }
   }
 
-  void add_face_mesh(const TopoDS_Face& shape, BoundaryFace& face,
-                     const TopTools_IndexedMapOfShape& vertices,
-                     const TopTools_IndexedMapOfShape& edges,
-                     std::vector<std::vector<int>>& edge_points, std::vector<Vec3>& points) {
+  // The points of all faces' meshes, those of a vertex or an edge once for all faces on it.
+  struct SharedPoints {
+    TopTools_IndexedMapOfShape vertices, edges;
+    std::vector<Vec3> points;               // those of the vertices first
+    std::vector<std::vector<int>> of_edge;  // empty: not met yet
+
+    // The points of an edge in the order of a face's polygon along it.
+    const std::vector<int>& along(const TopoDS_Edge& edge,
+                                  const Handle(Poly_PolygonOnTriangulation) & polygon,
+                                  const Handle(Poly_Triangulation) & mesh,
+                                  const TopLoc_Location& place) {
+      std::vector<int>& shared = of_edge[index(edges.FindIndex(edge)) - 1];
+      if (!shared.empty()) return shared;
+      TopoDS_Vertex first, last;
+      TopExp::Vertices(TopoDS::Edge(edge.Oriented(TopAbs_FORWARD)), first, last);
+      for (int k = 1; k <= polygon->NbNodes(); ++k) {
+        const TopoDS_Vertex& end = k == 1 ? first : last;
+        if ((k == 1 || k == polygon->NbNodes()) && !end.IsNull()) {
+          shared.push_back(vertices.FindIndex(end) - 1);
+        } else {
+          shared.push_back(add(mesh->Node(polygon->Node(k)), place));
+        }
+      }
+      return shared;
+    }
+
+    int add(const gp_Pnt& node, const TopLoc_Location& place) {
+      points.push_back(vec(node.Transformed(place).XYZ()));
+      return static_cast<int>(points.size()) - 1;
+    }
+  };
+
+  void add_face_mesh(const TopoDS_Face& shape, BoundaryFace& face, SharedPoints& shared) {
     TopLoc_Location place;
     const Handle(Poly_Triangulation) mesh = BRep_Tool::Triangulation(shape, place);
     if (mesh.IsNull()) {
@@ -336,41 +387,28 @@ class BoundaryBuilder {
                                              "self-intersections"});
       return;
     }
+
+    // Nodes on edges are the edges' points; those inside are the face's own.
     std::vector<int> number(index(mesh->NbNodes()), -1);
     for (TopExp_Explorer at(shape, TopAbs_EDGE); at.More(); at.Next()) {
       const TopoDS_Edge edge = TopoDS::Edge(at.Current());
       const Handle(Poly_PolygonOnTriangulation) polygon =
           BRep_Tool::PolygonOnTriangulation(edge, mesh, place);
       if (polygon.IsNull()) continue;
-      std::vector<int>& shared = edge_points[index(edges.FindIndex(edge)) - 1];
-      if (shared.empty()) {
-        TopoDS_Vertex first, last;
-        TopExp::Vertices(TopoDS::Edge(edge.Oriented(TopAbs_FORWARD)), first, last);
-        for (int k = 1; k <= polygon->NbNodes(); ++k) {
-          const TopoDS_Vertex& end = k == 1 ? first : last;
-          if ((k == 1 || k == polygon->NbNodes()) && !end.IsNull()) {
-            shared.push_back(vertices.FindIndex(end) - 1);
-          } else {
-            shared.push_back(static_cast<int>(points.size()));
-            points.push_back(vec(mesh->Node(polygon->Node(k)).Transformed(place).XYZ()));
-          }
-        }
-      }
-      for (std::size_t k = 0; k < shared.size() && k < index(polygon->NbNodes()); ++k) {
-        number[index(polygon->Node(static_cast<int>(k) + 1)) - 1] = shared[k];
+      const std::vector<int>& along = shared.along(edge, polygon, mesh, place);
+      for (std::size_t k = 0; k < along.size() && k < index(polygon->NbNodes()); ++k) {
+        number[index(polygon->Node(static_cast<int>(k) + 1)) - 1] = along[k];
       }
     }
     for (int k = 1; k <= mesh->NbNodes(); ++k) {
       int& n = number[index(k) - 1];
-      if (n < 0) {
-        n = static_cast<int>(points.size());
-        points.push_back(vec(mesh->Node(k).Transformed(place).XYZ()));
-      }
+      if (n < 0) n = shared.add(mesh->Node(k), place);
       if (mesh->HasUVNodes()) {
         const gp_Pnt2d uv = mesh->UVNode(k);
         face.mesh.parameters.emplace_back(uv.X(), uv.Y());
       }
     }
+
     for (int t = 1; t <= mesh->NbTriangles(); ++t) {
       int a = 0, b = 0, c = 0;
       mesh->Triangle(t).Get(a, b, c);

@@ -7,20 +7,22 @@
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
+#include "base/index.h"
 
 namespace angiospline {
 
 double flatten_corner(SurfaceNetwork& network, int corner) {
   Points3& points = network.control_points_mm;
   const Vec3 place = points.col(corner);
+
+  // The mean of the normals of all patches with a corner here, each outward: along_u x along_v
+  // turns over at two of a patch's four corners.
   std::set<int> neighbours;
   Vec3 normal = Vec3::Zero();
   for (const Patch& patch : network.patches) {
     const int rows = patch.u.control_point_count();
     const int across = patch.v.control_point_count();
-    const auto column = [&](int i, int j) {
-      return patch.control[static_cast<std::size_t>(i * across + j)];
-    };
+    const auto column = [&](int i, int j) { return patch.control[index(i * across + j)]; };
     for (const bool last_u : {false, true}) {
       for (const bool last_v : {false, true}) {
         const int i = last_u ? rows - 1 : 0;
@@ -37,6 +39,8 @@ double flatten_corner(SurfaceNetwork& network, int corner) {
     }
   }
   EXPECTS(neighbours.size() >= 3);
+
+  // The points beside the corner go straight down into that plane.
   normal.normalize();
   double farthest = 0;
   for (const int c : neighbours) {

@@ -18,13 +18,12 @@
 #include "modeling/continuity/smooth_network.h"
 #include "modeling/junction/junction.h"
 #include "recovery/thesis/smoothing/corner_tangents.h"
+#include "recovery/thesis/smoothing/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kBodyLength = 3.0;  // radii
-constexpr double kFitMove = 0.01;    // standard deviation of the moves of a fit, in radii
-constexpr std::uint64_t kFitSeed = 7;
+using namespace thesis_smoothing_rules;
 
 JunctionSpec bifurcation_spec() {
   const auto direction = [](double deg, double tilt_deg) {
@@ -40,10 +39,12 @@ JunctionSpec bifurcation_spec() {
   return spec;
 }
 
+// A tube straight on from an opening of the junction.
 BodyPiece straight_body(const Junction& junction, int opening, const std::string& name) {
   const JunctionOpening& from = junction.openings[index(opening)];
   BodyPiece piece;
   piece.start = opening_end(junction, opening, true);
+
   const Vec3 tip = from.center_mm + kBodyLength * from.radius_mm * from.axis;
   Eigen::Matrix4Xd target(4, 2);
   target.col(0) << from.center_mm, from.radius_mm;
@@ -53,6 +54,7 @@ BodyPiece straight_body(const Junction& junction, int opening, const std::string
   piece.end = free_end(path.curve, 1.0);
   piece.path = path.curve;
   piece.body = make_body(path, piece.start, piece.end, {0.5});
+
   piece.name = "wall_" + name;
   piece.radius_mm = from.radius_mm;
   piece.start_link.kind = BodyLink::Kind::kOpening;
@@ -62,6 +64,7 @@ BodyPiece straight_body(const Junction& junction, int opening, const std::string
   return piece;
 }
 
+// Whether a join lies between two sectors of the junction: one of the six that are rough (7.2.4).
 bool is_leg(const SurfaceNetwork& network, const Join& join) {
   const auto kind = [&](const Side& side) {
     return network.regions[index(network.patches[index(side.patch)].region)].kind;
@@ -153,12 +156,12 @@ class Quartering {
   }
 
   int column(const Vec3& point, bool shared) {
-    constexpr double kGrid = 1e-9;
     const auto key = [&](double shift) {
       std::array<long long, 3> k{};
-      for (int d = 0; d < 3; ++d) k[index(d)] = std::llround(point(d) / kGrid + shift);
+      for (int d = 0; d < 3; ++d) k[index(d)] = std::llround(point(d) / kSamePlace + shift);
       return k;
     };
+    // Cells half a cell apart: two places nearer than half a cell share one of them.
     if (shared) {
       for (const double shift : {0.0, 0.5, -0.5}) {
         const auto found = places_.find(key(shift));
@@ -193,7 +196,7 @@ class Quartering {
   int end_column(const Side& side, bool last) const {
     const Patch& patch = whole_.network.patches[index(side.patch)];
     const int row = side.side == PatchSide::kU0 ? 0 : patch.u.control_point_count() - 1;
-    return patch.control[index(6 * row + (last ? 5 : 0))];
+    return patch.control[index(kPatchRows * row + (last ? kPatchRows - 1 : 0))];
   }
 
   // Parts of a side in the order of its parameter.
@@ -253,8 +256,8 @@ void move_like_a_fit(ThesisTessellation& model) {
       const Join& join = model.network.joins[index(j)];
       const std::vector<int>& control = model.network.patches[index(join.a.patch)].control;
       // The boundary's inner points, on side V1.
-      for (int i = 1; i < 5; ++i) {
-        const int c = control[index(6 * i + 5)];
+      for (int i = 1; i + 1 < kPatchRows; ++i) {
+        const int c = control[index(kPatchRows * i + kPatchRows - 1)];
         if (std::exchange(moved[index(c)], 1)) continue;
         for (int d = 0; d < 3; ++d) {
           model.network.control_points_mm(d, c) += kFitMove * random.gaussian();
@@ -264,6 +267,7 @@ void move_like_a_fit(ThesisTessellation& model) {
   }
 }
 
+// One experiment of 7.2.4.
 struct Case {
   ThesisCase which;
   const char* name;
@@ -272,6 +276,39 @@ struct Case {
   std::vector<std::vector<int>> systems;
   bool floating;
 };
+
+// All experiments but the sparse one. `level`: with flat corners; `fitted`: moved as a fit would.
+std::vector<Case> cases_of(const ThesisBifurcation& model, const ThesisTessellation& cut,
+                           const ThesisTessellation& level, const ThesisTessellation& fitted,
+                           const ThesisTessellation& fitted_level) {
+  std::vector<int> all(model.network.joins.size());
+  std::iota(all.begin(), all.end(), 0);
+  return {{ThesisCase::kAll,
+           "all 21 boundaries",
+           "436 constraints, 726 unknowns: impractical",
+           model.network,
+           {all},
+           true},
+          {ThesisCase::kRough,
+           "the 6 rough boundaries",
+           "134 constraints, 156 unknowns, 10,000 iterations, over 4 days",
+           model.network,
+           {model.rough},
+           true},
+          {ThesisCase::kHeld, "tessellated, boundaries held",
+           "28 patches, 2 systems of 45 constraints, 66 unknowns, 10,000 iterations, 45 min",
+           cut.network, cut.systems, false},
+          {ThesisCase::kHeldLevel, "tessellated, corners level, boundaries held", "", level.network,
+           cut.systems, false},
+          {ThesisCase::kFloating, "tessellated, boundaries floating", "", cut.network, cut.systems,
+           true},
+          {ThesisCase::kFittedHeld, "after a fit, boundaries held",
+           "45 constraints, 66 unknowns: unacceptable", fitted.network, cut.systems, false},
+          {ThesisCase::kFittedHeldLevel, "after a fit, corners level, boundaries held", "",
+           fitted_level.network, cut.systems, false},
+          {ThesisCase::kFittedFloating, "after a fit, boundaries floating",
+           "45 constraints, 102 unknowns: continuous", fitted.network, cut.systems, true}};
+}
 
 Result<ThesisSmoothingRow> run_case(const Case& one, double most_seconds,
                                     const Progress& progress) {
@@ -283,6 +320,7 @@ Result<ThesisSmoothingRow> run_case(const Case& one, double most_seconds,
   row.patches = static_cast<int>(network.patches.size());
   row.systems = static_cast<int>(one.systems.size());
   row.before_deg = worst_of_all(network);
+
   auto reports = smooth_by_triple_curves(network, one.systems, options, progress);
   if (!reports) return fail(reports.error());
   row.reports = std::move(*reports);
@@ -339,7 +377,7 @@ double flatten_corners(ThesisTessellation& tessellation) {
     for (const int j : joins) {
       const Join& join = tessellation.network.joins[index(j)];
       const std::vector<int>& control = tessellation.network.patches[index(join.a.patch)].control;
-      corners.insert({control[5], control.back()});  // the ends of side V1
+      corners.insert({control[kPatchRows - 1], control.back()});  // the ends of side V1
     }
   }
   double farthest = 0;
@@ -352,8 +390,7 @@ Result<std::vector<ThesisSmoothingRow>> run_thesis_smoothing(double most_seconds
                                                              const Progress& progress) {
   const Result<ThesisBifurcation> model = thesis_bifurcation();
   if (!model) return fail(model.error());
-  std::vector<int> all(model->network.joins.size());
-  std::iota(all.begin(), all.end(), 0);
+
   const ThesisTessellation cut = tessellated(*model);
   ThesisTessellation level = cut;
   flatten_corners(level);
@@ -361,32 +398,8 @@ Result<std::vector<ThesisSmoothingRow>> run_thesis_smoothing(double most_seconds
   move_like_a_fit(fitted);
   ThesisTessellation fitted_level = fitted;
   flatten_corners(fitted_level);
-  const std::vector<Case> cases{
-      {ThesisCase::kAll,
-       "all 21 boundaries",
-       "436 constraints, 726 unknowns: impractical",
-       model->network,
-       {all},
-       true},
-      {ThesisCase::kRough,
-       "the 6 rough boundaries",
-       "134 constraints, 156 unknowns, 10,000 iterations, over 4 days",
-       model->network,
-       {model->rough},
-       true},
-      {ThesisCase::kHeld, "tessellated, boundaries held",
-       "28 patches, 2 systems of 45 constraints, 66 unknowns, 10,000 iterations, 45 min",
-       cut.network, cut.systems, false},
-      {ThesisCase::kHeldLevel, "tessellated, corners level, boundaries held", "", level.network,
-       cut.systems, false},
-      {ThesisCase::kFloating, "tessellated, boundaries floating", "", cut.network, cut.systems,
-       true},
-      {ThesisCase::kFittedHeld, "after a fit, boundaries held",
-       "45 constraints, 66 unknowns: unacceptable", fitted.network, cut.systems, false},
-      {ThesisCase::kFittedHeldLevel, "after a fit, corners level, boundaries held", "",
-       fitted_level.network, cut.systems, false},
-      {ThesisCase::kFittedFloating, "after a fit, boundaries floating",
-       "45 constraints, 102 unknowns: continuous", fitted.network, cut.systems, true}};
+  const std::vector<Case> cases = cases_of(*model, cut, level, fitted, fitted_level);
+
   std::vector<ThesisSmoothingRow> rows;
   for (const Case& one : cases) {
     progress.at(one.name, static_cast<double>(rows.size()) / static_cast<double>(cases.size()));

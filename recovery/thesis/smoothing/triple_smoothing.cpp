@@ -17,17 +17,12 @@
 #include "kernel/continuity/triple_curve.h"
 #include "kernel/numerics/spectrum.h"
 #include "kernel/refine/reshape.h"
+#include "recovery/thesis/smoothing/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kDependent = 1e-7;  // singular values below this share of the largest are zero
-constexpr int kMostRestarts = 6;
-constexpr double kWorthwhile = 0.7;  // of the angle before: what improves it less is taken back
-constexpr int kAngleSamples = 32;
-constexpr int kPlaces = 4;             // at which gradients are taken to find what is fixed
-constexpr double kApart = 0.1;         // those places, in units of the system's size
-constexpr double kUnchanging = 1e-10;  // gradients below this share of the largest are zero
+using namespace thesis_smoothing_rules;
 
 SurfaceSide surface_side(PatchSide side) {
   switch (side) {
@@ -82,6 +77,9 @@ class TripleSystem {
                const TripleSmoothingOptions& options, const Progress& progress)
       : network_(network), joins_(std::move(joins)), options_(options), progress_(progress) {
     find_unknowns();
+
+    // The triple curve Phi = F'.(G' x H') of each boundary (3.1), whose values at its nodes are the
+    // constraints (3.5); divided by its factors' lengths they are sines.
     for (const int j : joins_) {
       const Join& join = network.joins[index(j)];
       const BSplineSurface<3> a = patch_surface(network, join.a.patch);
@@ -99,6 +97,8 @@ class TripleSystem {
            scale});
       constraints_ += static_cast<int>(boundaries_.back().curve.nodes().size());
     }
+
+    // Lengths in units of the system's own size.
     double size = 0;
     for (const int c : columns_) size += (start().col(c) - start().col(columns_.front())).norm();
     size_ = columns_.empty() ? 1.0 : std::max(size / static_cast<double>(columns_.size()), 1e-300);
@@ -116,6 +116,8 @@ class TripleSystem {
     report.before_deg = report.after_deg = worst_angle();
     deadline_ = begin + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
                             std::chrono::duration<double>(options_.most_seconds));
+
+    // Each round chooses its independent constraints anew and solves for them.
     if (columns_.empty()) report.ending = TripleEnding::kInfeasible;
     for (int round = 0; round < kMostRestarts && !columns_.empty(); ++round) {
       if (report.after_deg <= options_.wanted_deg) {
@@ -139,6 +141,7 @@ class TripleSystem {
       report.after_deg = now;
       if (now <= options_.wanted_deg) report.ending = TripleEnding::kSmooth;
     }
+
     if (!options_.floating || report.ending != TripleEnding::kSmooth) find_fixed(report);
     report.evaluations = evaluations_;
     report.seconds =
@@ -154,6 +157,8 @@ class TripleSystem {
  private:
   const Points3& start() const { return network_.control_points_mm; }
 
+  // The points of the boundaries, if these float, and of the rows beside them (7.2.4), but for what
+  // other joins, rims and dependencies hold.
   void find_unknowns() {
     std::set<int> held;
     for (int j = 0; j < static_cast<int>(network_.joins.size()); ++j) {
@@ -168,6 +173,7 @@ class TripleSystem {
       held.insert(dependency.point);
       for (const auto& [master, weight] : dependency.masters) held.insert(master);
     }
+
     std::set<int> free;
     for (const int j : joins_) {
       for (const Side& side : {network_.joins[index(j)].a, network_.joins[index(j)].b}) {
@@ -178,6 +184,7 @@ class TripleSystem {
         }
       }
     }
+
     columns_.assign(free.begin(), free.end());
     unknown_.assign(static_cast<std::size_t>(network_.control_points_mm.cols()), -1);
     for (std::size_t k = 0; k < columns_.size(); ++k) {
@@ -217,8 +224,7 @@ class TripleSystem {
       if (jacobian != nullptr) {
         for (const TripleGradient& g : triple.gradient) {
           const int patch = g.surface == 0 ? join.a.patch : join.b.patch;
-          const int column =
-              network_.patches[index(patch)].control[static_cast<std::size_t>(g.point)];
+          const int column = network_.patches[index(patch)].control[index(g.point)];
           const int unknown = unknown_[index(column)];
           if (unknown < 0) continue;
           jacobian->block<1, 3>(row + g.node, unknown) +=
@@ -261,6 +267,8 @@ class TripleSystem {
       all.middleCols(k * J.cols(), J.cols()) = J;
     }
     network_.control_points_mm = here;
+
+    // Left singular vectors beyond the rank: combinations without a gradient at all the places.
     const auto [U, s, V] = singular_values(all, SingularVectors::kFullLeft);
     const auto changing = (s.array() > kUnchanging * s(0)).count();
     report.fixed = static_cast<int>(all.rows() - changing);
@@ -317,12 +325,17 @@ class TripleSystem {
   void solve() {
     const auto n = static_cast<unsigned>(3 * columns_.size());
     origin_ = start()(Eigen::all, columns_);
+
+    // The thesis minimises the points' moves under the constraints by a quasi-Newton method
+    // (3.2.2); sequential quadratic programming (Kraft 1988) is its successor.
     nlopt::opt solver(nlopt::LD_SLSQP, n);
     solver.set_min_objective(objective, nullptr);
     solver.add_equality_mconstraint(
-        constraint, this, std::vector<double>(static_cast<std::size_t>(chosen_.cols()), 1e-14));
-    solver.set_xtol_rel(1e-10);
+        constraint, this,
+        std::vector<double>(static_cast<std::size_t>(chosen_.cols()), kConstraintTolerance));
+    solver.set_xtol_rel(kStepTolerance);
     solver.set_maxeval(std::max(1, options_.most_evaluations - evaluations_));
+
     std::vector<double> x(n, 0.0);
     double least = 0;
     try {
@@ -382,6 +395,8 @@ Result<std::vector<TripleSystemReport>> smooth_by_triple_curves(
       if (auto error = find_bad_join(network, j)) return fail(*error);
     }
   }
+
+  // Systems that share no control point are independent: the thesis's "parallel" processes (7.2.4).
   std::vector<TripleSystem> work;
   std::set<int> taken;
   for (const std::vector<int>& joins : systems) {
@@ -394,10 +409,12 @@ Result<std::vector<TripleSystemReport>> smooth_by_triple_curves(
       }
     }
   }
+
   std::vector<TripleSystemReport> reports(work.size());
   tbb::parallel_for(std::size_t{0}, work.size(),
                     [&](std::size_t k) { reports[k] = work[k].run(); });
   if (progress.should_stop()) return fail(cancelled("smooth by triple curves"));
+
   const Points3 before = network.control_points_mm;
   for (std::size_t k = 0; k < work.size(); ++k) {
     work[k].write(network.control_points_mm);
