@@ -121,8 +121,8 @@ class Mender {
     return sum / static_cast<double>(sides.size());
   }
 
-  // Steps on both sides of an end along one direction: with equal steps around, tangent planes
-  // agree all along the boundary (the triple product of thesis 3.2 vanishes term by term).
+  // The rows beside an end go along one direction on both sides of it: cross derivatives are then
+  // parallel at every point, and the triple product of (3.1) in the thesis vanishes.
   void align(const JoinedEnd& end, bool at_start) {
     const Vec3 into =
         (mean_step(end.own).normalized() - mean_step(end.others).normalized()).normalized();

@@ -11,7 +11,9 @@
 #include "kernel/spline/evaluator.h"
 #include "modeling/build/build_model.h"
 #include "recovery/phantoms/phantom.h"
+#include "recovery/thesis/deform/potentials.h"
 #include "recovery/thesis/deform/solver.h"
+#include "recovery/thesis/deform/system.h"
 #include "recovery/thesis/experiments/slice.h"
 
 namespace angiospline {
