@@ -282,7 +282,7 @@ Result<DeformedModel> deform_model(const Model& model, const Image<float>& image
 
   result.model = model;
   result.model.network = std::move(patches->smooth.network);
-  for (std::string& text :
+  for (Warning& warning :
        warnings_of(patches->smooth.parts, result.without_edge, result.report.termination)) {
     result.model.warnings.push_back(std::move(warning));
   }

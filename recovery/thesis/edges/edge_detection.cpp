@@ -13,18 +13,16 @@
 #include <tbb/parallel_for.h>
 
 #include "recovery/thesis/edges/edge_masks.h"
+#include "recovery/thesis/edges/rules.h"
 
 namespace angiospline {
 namespace {
 
+using namespace edge_rules;
+
 constexpr int kLanes = EdgeMaskBank::kLanes;
 constexpr std::size_t kMostOffsets = 62;
-constexpr std::size_t kPercentileSample = std::size_t{1} << 17;
-// The gate compares a bound in doubles with answers in floats: their rounding, at most 62 half ulps
-// of the product of the norms, is far below this share of the bound.
-constexpr double kGateSlack = 1e-4;
 constexpr int kSpared = -1;  // in place of a direction: the voxel cannot be an edge
-constexpr int kRowsBetweenTries = 16;
 
 struct Answer {
   float strength = 0;
@@ -61,6 +59,8 @@ class Masks {
       squares += d * d;
       first += d * Vec3(o[0], o[1], o[2]);
     }
+
+    // Cauchy-Schwarz on the linear part of the differences and on the rest.
     const double rest = std::max(0.0, squares - first.squaredNorm() / bank_.moment);
     const double most = bank_.gradient_gain * first.norm() + bank_.rest_gain * std::sqrt(rest);
     if (most * (1 + kGateSlack) < least) return {0, kSpared};
@@ -79,6 +79,8 @@ class Masks {
         out[k] = static_cast<float>(centre[steps_[k]]) - static_cast<float>(centre[-steps_[k]]);
       return;
     }
+
+    // Beyond the border the border value goes on.
     const auto value = [&](const Voxel& o, int sign) {
       Voxel at;
       for (std::size_t i = 0; i < 3; ++i) at[i] = std::clamp(v[i] + sign * o[i], 0, size[i] - 1);
@@ -126,6 +128,7 @@ class SliceBounds {
     std::fill(ramp_.begin(), ramp_.end(), 0.0);
     std::fill(square_.begin(), square_.end(), 0.0);
     const std::size_t count = sum_.size();
+
     // About this value sums of squares lose few digits.
     const auto middle = static_cast<double>(image_.voxels[static_cast<std::size_t>(z) * count]);
     for (int o = -2; o <= 2; ++o) {
@@ -153,6 +156,8 @@ class SliceBounds {
         rows_[3][x + 2] += square_[from + x];
       }
     }
+
+    // The border's values go on, so that every box is whole.
     for (auto& row : rows_) {
       row[0] = row[1] = row[2];
       row[width_ + 2] = row[width_ + 3] = row[width_ + 1];
@@ -166,6 +171,8 @@ class SliceBounds {
     const auto box = [x](const std::vector<double>& r) {
       return r[x] + r[x + 1] + r[x + 2] + r[x + 3] + r[x + 4];
     };
+
+    // First moments of the differences, and what is left of their squares.
     const std::vector<double>& s = rows_[0];
     const double gx = 2 * (s[x + 4] - s[x]) + s[x + 3] - s[x + 1];
     const double gy = box(rows_[1]), gz = box(rows_[2]), total = box(s);
@@ -195,6 +202,7 @@ Result<void> check(const Image<T>& image, const EdgeOptions& options) {
       p != nullptr && !(p->percent >= 0 && p->percent < 100))
     return bad("percentile is not usable", p->percent, "from 0 to below 100");
   if (image.voxels.empty()) return bad("image is empty", 0, "at least one voxel");
+
   bool constant = true;
   for (std::size_t i = 0; i < image.voxels.size(); ++i) {
     if constexpr (std::is_floating_point_v<T>) {
@@ -222,12 +230,14 @@ double percentile_strength(const Image<T>& image, const Masks<T>& masks, double 
   // Not along with the rows: a stride that shares no factor with them visits all columns.
   const auto nx = static_cast<std::size_t>(image.grid.size[0]);
   while (stride > 1 && std::gcd(stride, nx) != 1) ++stride;
+
   std::vector<float> strengths((count + stride - 1) / stride);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, strengths.size(), 1024),
                     [&](const tbb::blocked_range<std::size_t>& r) {
                       for (std::size_t i = r.begin(); i != r.end(); ++i)
                         strengths[i] = masks.at(image.grid.voxel(i * stride)).strength;
                     });
+
   const auto rank = static_cast<std::size_t>(percent / 100 * static_cast<double>(strengths.size()));
   const auto nth = strengths.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(strengths.begin(), nth, strengths.end());
@@ -250,6 +260,7 @@ SliceEdges edges_of_slice(const Image<T>& image, const Masks<T>& masks, SliceBou
   for (int y = 0; y < image.grid.size[1]; ++y) {
     const double* bound = bounds != nullptr ? bounds->row(y).data() : nullptr;
     if (y % kRowsBetweenTries == 0) look_closer = bounds != nullptr;
+
     int tried = 0, spared = 0;
     for (int x = 0; x < image.grid.size[0]; ++x) {
       if (bound != nullptr && bound[x] * (1 + kGateSlack) < least) continue;
@@ -261,8 +272,9 @@ SliceEdges edges_of_slice(const Image<T>& image, const Masks<T>& masks, SliceBou
       else if (static_cast<double>(a.strength) >= least && a.strength > 0)
         out.edges.push_back({v, a.strength, static_cast<std::int16_t>(a.normal)});
     }
+
     out.examined += static_cast<std::size_t>(tried - spared);
-    look_closer = look_closer && 4 * spared >= tried;
+    look_closer = look_closer && kWorthwhileSparing * spared >= tried;
   }
   return out;
 }
@@ -277,7 +289,8 @@ std::vector<Edge> thinned(const EdgeField& field, const ImageGrid& grid) {
                                     [&](const Edge& e, std::size_t w) { return rank(e) < w; });
     return i != field.edges.end() && rank(*i) == wanted ? &*i : nullptr;
   };
-  const double same_way = std::cos(std::numbers::pi / 6) - 1e-9;
+
+  const double same_way = std::cos(std::numbers::pi / 6) - kSameWayRounding;
   const auto normal = [&](const Edge& e) {
     return field.normals[static_cast<std::size_t>(e.normal)];
   };
@@ -286,6 +299,8 @@ std::vector<Edge> thinned(const EdgeField& field, const ImageGrid& grid) {
     // The step to the neighbours: the normal in voxels, its largest component made 1.
     Vec3 step = (grid.direction.transpose() * normal(e)).cwiseQuotient(grid.spacing_mm);
     step /= step.cwiseAbs().maxCoeff();
+
+    // Against both of them; those that run another way belong to another edge.
     bool strongest = true;
     for (const int sign : {-1, 1}) {
       Voxel v = e.voxel;
@@ -307,6 +322,8 @@ template <typename T>
 Result<EdgeField> find_edges(const Image<T>& image, const EdgeOptions& options,
                              const Progress& progress) {
   if (const auto ok = check(image, options); !ok) return fail(ok.error());
+
+  // Both directions of each pair of masks, in the world's frame.
   const Masks<T> masks(image);
   EdgeField field;
   for (const double sign : {1.0, -1.0})
@@ -318,6 +335,8 @@ Result<EdgeField> find_edges(const Image<T>& image, const EdgeOptions& options,
     field.threshold =
         percentile_strength(image, masks, std::get<EdgePercentile>(options.threshold).percent);
   }
+
+  // Slice by slice on all cores; put together in order, so that threads change nothing.
   const bool gated = options.gate == EdgeGate::kMoments && !masks.bank().flat;
   const int depth = image.grid.size[2];
   std::vector<SliceEdges> slices(static_cast<std::size_t>(depth));
@@ -335,6 +354,7 @@ Result<EdgeField> find_edges(const Image<T>& image, const EdgeOptions& options,
     }
   });
   if (stop) return fail(cancelled("finding edges"));
+
   for (const SliceEdges& s : slices) {
     field.edges.insert(field.edges.end(), s.edges.begin(), s.edges.end());
     field.examined += s.examined;

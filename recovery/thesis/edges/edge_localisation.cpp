@@ -9,19 +9,13 @@
 
 #include "recovery/imaging/image/gaussian.h"
 #include "recovery/thesis/edges/edge_masks.h"
+#include "recovery/thesis/edges/rules.h"
 #include "recovery/wall/wall_profile.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kReach = 2;             // voxels of answers around an edge's own
-constexpr double kPeakStep = 0.125;   // voxels, before the parabola
-constexpr double kHalfWindow = 1.5;   // of the profile sum, in widths of a voxel
-constexpr double kFarthest = 2.0;     // widths of a voxel from the peak, or it is another edge
-constexpr int kRounds = 4;            // of sum, then normal and curvatures at the new place
-constexpr double kDifference = 0.75;  // voxels between values of a difference
-constexpr double kPlateau = 2.0;      // widths of a voxel from the wall to a level that has no room
-                                      // further in
+using namespace edge_rules;
 
 class Localiser {
  public:
@@ -34,19 +28,24 @@ class Localiser {
         smooth_(smooth_image_),
         field_(field) {}
 
+  // Where the answers of the edge's own mask are largest along its direction.
   EdgePlace peak(const Edge& edge) const {
     EdgePlace place;
     const Vec3 inward = field_.normals[static_cast<std::size_t>(edge.normal)];
     place.normal = -inward;
     place.strength = static_cast<double>(edge.strength);
+
     const Vec3 centre = image_.grid.world_mm(edge.voxel);
     const Image<float> answers = answers_around(edge);
     const GreyField between(answers);
+
     // One voxel along the direction, each way.
     const double step = kPeakStep * grey_.width_mm(inward);
     const int count = static_cast<int>(1 / kPeakStep);
     std::vector<double> value;
     for (int k = -count; k <= count; ++k) value.push_back(between.at(centre + k * step * inward));
+
+    // The top of the parabola through the largest and its two neighbours.
     const auto best = std::max_element(value.begin(), value.end()) - value.begin();
     double at = static_cast<double>(best) - count;
     if (best > 0 && best + 1 < std::ssize(value)) {
@@ -63,15 +62,18 @@ class Localiser {
     EdgePlace place = raw;
     for (int round = 0; round < kRounds; ++round) {
       if (!bend(place)) return raw;
+
+      // Levels on both sides of the wall, or where there is no room for them the greys there.
       const WallPoint at{place.point_mm, place.normal, place.largest_curvature,
                          place.smallest_curvature};
       WallLevels levels;
-      const WallSides sides = wall_sides(grey_, at, raw.strength / 4);
+      const WallSides sides = wall_sides(grey_, at, raw.strength * kLevelShare);
       const double far = kPlateau * grey_.width_mm(place.normal);
       levels.inside =
           sides.inside_weight > 0 ? sides.inside : grey_.at(place.point_mm - far * place.normal);
       levels.outside =
           sides.outside_weight > 0 ? sides.outside : grey_.at(place.point_mm + far * place.normal);
+
       const WallOffset offset = wall_offset(grey_, at, levels, {kHalfWindow, 0.0});
       if (!offset.measured) return raw;
       place.point_mm += offset.offset_mm * place.normal;
@@ -87,16 +89,19 @@ class Localiser {
   // on.
   Image<float> answers_around(const Edge& edge) const {
     ImageGrid grid = image_.grid;
-    grid.size = {2 * kReach + 1, 2 * kReach + 1, 2 * kReach + 1};
+    grid.size = {2 * kAnswerReach + 1, 2 * kAnswerReach + 1, 2 * kAnswerReach + 1};
     const Voxel& c = edge.voxel;
-    grid.origin_mm = image_.grid.world_mm(Voxel{c[0] - kReach, c[1] - kReach, c[2] - kReach});
+    grid.origin_mm =
+        image_.grid.world_mm(Voxel{c[0] - kAnswerReach, c[1] - kAnswerReach, c[2] - kAnswerReach});
+
     Image<float> out(grid);
     const int pairs = bank_.pairs();
     const auto mask = static_cast<std::size_t>(edge.normal % pairs);
     const float sign = edge.normal < pairs ? 1.0F : -1.0F;
     for (std::size_t i = 0; i < out.voxels.size(); ++i) {
       const Voxel o = grid.voxel(i);
-      const Voxel at{c[0] - kReach + o[0], c[1] - kReach + o[1], c[2] - kReach + o[2]};
+      const Voxel at{c[0] - kAnswerReach + o[0], c[1] - kAnswerReach + o[1],
+                     c[2] - kAnswerReach + o[2]};
       float sum = 0;
       for (std::size_t k = 0; k < bank_.offsets.size(); ++k)
         sum += bank_.weights[k * EdgeMaskBank::kLanes + mask] *
@@ -131,6 +136,8 @@ class Localiser {
         hessian(i, j) = hessian(j, i) = (f(x + y) - f(x - y) - f(y - x) + f(-x - y)) / (4 * h * h);
       }
     }
+
+    // Shape operator of a level surface: the Hessian along it over the gradient's length.
     const double slope = gradient.norm();
     if (!(slope > 0)) return false;
     place.normal = -gradient / slope;

@@ -4,10 +4,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "recovery/thesis/edges/rules.h"
+
 namespace angiospline {
 namespace {
 
-constexpr int kReach = 2;
+using namespace edge_rules;
+
+constexpr int kReach = 2;  // of 5 x 5 x 5 voxels
 
 bool comes_first(const Voxel& v) {  // one of each pair of opposite offsets
   if (v[2] != 0) return v[2] > 0;
@@ -33,10 +37,13 @@ double share_beyond_plane(const Vec3& centre, const Vec3& edges, const Vec3& nor
   const double top = normal.dot(centre) + 0.5 * width.sum();
   if (top <= 0) return 0;
   if (top >= width.sum()) return 1;
+
+  // That volume is the sum over the cube's corners of (-1)^|corner| max(0, top - width . corner)^n
+  // / (n! product of widths), over the n directions that have a width.
   std::array<double, 3> used{};
   std::size_t count = 0;
   for (int i = 0; i < 3; ++i)
-    if (width[i] > 1e-9 * width.maxCoeff()) used[count++] = width[i];
+    if (width[i] > kNoWidth * width.maxCoeff()) used[count++] = width[i];
   double volume = 0;
   for (unsigned corner = 0; corner < 1U << count; ++corner) {
     double at = top;
@@ -78,7 +85,7 @@ std::vector<Vec3> edge_directions(bool flat) {
   }
   // Components that are 0 but for rounding are made 0, so that symmetric masks are symmetric.
   for (Vec3& d : directions)
-    d = d.unaryExpr([](double x) { return std::abs(x) < 1e-12 ? 0.0 : x; });
+    d = d.unaryExpr([](double x) { return std::abs(x) < kNoComponent ? 0.0 : x; });
   return directions;
 }
 
@@ -89,6 +96,9 @@ EdgeMaskBank::EdgeMaskBank(const ImageGrid& grid)
   });
   weights.assign(offsets.size() * kLanes, 0.0F);
   for (const Voxel& v : offsets) moment += v[0] * v[0];
+
+  // A mask over the sum of its squares answers a step of its own direction with the step's height;
+  // its linear part and the rest bound all answers (edge_masks.h).
   for (int m = 0; m < pairs(); ++m) {
     const EdgeMask mask = edge_mask(normals[static_cast<std::size_t>(m)], grid.spacing_mm, flat);
     double squares = 0;
