@@ -66,18 +66,6 @@ Vec2 side_parameters(const BSplineSurface<3>& patch, PatchSide side, double t) {
   return {t, patch.v().last()};
 }
 
-FaceKind face_kind(RimKind kind) {
-  switch (kind) {
-    case RimKind::kInlet:
-      return FaceKind::kInlet;
-    case RimKind::kOutlet:
-      return FaceKind::kOutlet;
-    case RimKind::kCap:
-      break;
-  }
-  return FaceKind::kCap;
-}
-
 BSplineCurve<3> side_curve(const BSplineSurface<3>& patch, PatchSide side) {
   const bool along_v = side == PatchSide::kU0 || side == PatchSide::kU1;
   const KnotVector& knots = along_v ? patch.v() : patch.u();
@@ -142,7 +130,7 @@ Result<BoundaryModel> boundary_of(const SurfaceNetwork& network) {
     const Rim& rim = network.rims[r];
     BoundaryFace face;
     face.name = rim.name;
-    face.kind = face_kind(rim.kind);
+    face.kind = kind_of_rim(rim.kind);
     face.radius_mm = rim.radius_mm;
     face.shell = topology.components[index(rim.sides.front().patch)];
     face.plane = plane_of(rim, topology.rim_loops[r], model.edges);

@@ -98,9 +98,6 @@ Result<BoundaryModel> boundary_of(const SurfaceNetwork& network);
 // The vector from a side's parameter to (u, v).
 Vec2 side_parameters(const BSplineSurface<3>& patch, PatchSide side, double t);
 
-// The kind of the face that closes a rim.
-FaceKind face_kind(RimKind kind);
-
 // Boundary row of a patch: the curve of its side.
 BSplineCurve<3> side_curve(const BSplineSurface<3>& patch, PatchSide side);
 

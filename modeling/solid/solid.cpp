@@ -261,7 +261,7 @@ class SolidBuilder {
     for (const int r : rims) {
       builder_.Add(shell, cap_faces_[index(r)]);
       const Rim& rim = network_.rims[index(r)];
-      const FaceKind kind = face_kind(rim.kind);
+      const FaceKind kind = kind_of_rim(rim.kind);
       faces.push_back({rim.name, kind, rim.radius_mm, face_colour(kind, rim.name)});
     }
     shell.Closed(true);

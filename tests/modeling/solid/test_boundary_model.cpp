@@ -88,10 +88,10 @@ TEST(BreaksBetween, AreTheEndsAndTheKnotsStrictlyInside) {
   EXPECT_EQ(breaks_between(knots, 1.2, 1.3), (std::vector<double>{1.2, 1.3}));
 }
 
-TEST(FaceKind, OfARimIsItsOwn) {
-  EXPECT_EQ(face_kind(RimKind::kInlet), FaceKind::kInlet);
-  EXPECT_EQ(face_kind(RimKind::kOutlet), FaceKind::kOutlet);
-  EXPECT_EQ(face_kind(RimKind::kCap), FaceKind::kCap);
+TEST(KindOfRim, IsThatOfTheFaceThatClosesIt) {
+  EXPECT_EQ(kind_of_rim(RimKind::kInlet), FaceKind::kInlet);
+  EXPECT_EQ(kind_of_rim(RimKind::kOutlet), FaceKind::kOutlet);
+  EXPECT_EQ(kind_of_rim(RimKind::kCap), FaceKind::kCap);
 }
 
 TEST(TessellateSolid, IsClosedWithThePartsAndTheVolumeOfTheSolid) {
