@@ -18,6 +18,7 @@ std::optional<Error> find_branch_defect(const CenterlineBranch& branch, int node
                     "0 to " + std::to_string(nodes - 1));
     }
   }
+
   if (branch.points_mm.cols() < 2) {
     return defect("branch has too few points", where, std::to_string(branch.points_mm.cols()),
                   "at least two");
@@ -26,6 +27,7 @@ std::optional<Error> find_branch_defect(const CenterlineBranch& branch, int node
     return defect("wrong number of radii", where, std::to_string(branch.radii_mm.size()),
                   "one for each point");
   }
+
   for (Eigen::Index k = 0; k < branch.points_mm.cols(); ++k) {
     const double radius = branch.radii_mm[k];
     if (!branch.points_mm.col(k).allFinite()) {

@@ -96,6 +96,8 @@ Corners find_corners(const SurfaceNetwork& network, const std::vector<NetworkEdg
           {side.from, static_cast<int>(e), use, -1, -1});
     }
   }
+
+  // A patch's own corners, counter-clockwise, whoever shares them.
   std::vector<Vec3> positions;
   for (const Patch& patch : network.patches) {
     const int nu = patch.u.control_point_count();
@@ -104,6 +106,8 @@ Corners find_corners(const SurfaceNetwork& network, const std::vector<NetworkEdg
       positions.emplace_back(network.control_points_mm.col(patch.control[index(k)]));
     }
   }
+
+  // Along a side its uses meet head to tail; where two of them do there is a T-vertex.
   for (std::size_t p = 0; p < network.patches.size(); ++p) {
     for (std::size_t s = 0; s < 4; ++s) {
       std::vector<SideUse>& uses = corners.sides[p][s];
@@ -119,6 +123,7 @@ Corners find_corners(const SurfaceNetwork& network, const std::vector<NetworkEdg
       }
     }
   }
+
   corners.positions_mm.resize(3, static_cast<Eigen::Index>(positions.size()));
   for (std::size_t k = 0; k < positions.size(); ++k) {
     corners.positions_mm.col(static_cast<Eigen::Index>(k)) = positions[k];
@@ -145,6 +150,8 @@ void make_vertices(const Corners& corners, NetworkTopology& topology) {
   }
   int count = 0;
   const std::vector<int> vertex = sets.numbers(count);
+
+  // A vertex lies at the mean of its corners, and knows how far they are from it.
   topology.vertices_mm = Points3::Zero(3, count);
   topology.vertex_gaps_mm.assign(index(count), 0.0);
   Eigen::VectorXd members = Eigen::VectorXd::Zero(count);
@@ -160,6 +167,7 @@ void make_vertices(const Corners& corners, NetworkTopology& topology) {
     double& largest = topology.vertex_gaps_mm[index(vertex[c])];
     largest = std::max(largest, gap);
   }
+
   for (std::size_t e = 0; e < ends.size(); ++e) {
     topology.edges[e].first_vertex = vertex[index(ends[e][0][0])];
     topology.edges[e].last_vertex = vertex[index(ends[e][0][1])];
@@ -210,6 +218,7 @@ Result<std::vector<LoopEdge>> rim_loop(const Rim& rim, int first_edge,
   for (std::size_t k = 0; k < rim.sides.size(); ++k) {
     loop.push_back({first_edge + static_cast<int>(k), 0, !runs_along_loop(rim.sides[k].side)});
   }
+
   const auto start = [&](const LoopEdge& e) {
     const NetworkEdge& edge = edges[index(e.edge)];
     return e.forward ? edge.first_vertex : edge.last_vertex;
@@ -224,6 +233,8 @@ Result<std::vector<LoopEdge>> rim_loop(const Rim& rim, int first_edge,
     }
     return true;
   };
+
+  // Sides follow each other around the rim one way or the other.
   if (is_closed()) return loop;
   std::reverse(loop.begin(), loop.end());
   if (is_closed()) return loop;
@@ -252,6 +263,8 @@ double second_parameter(const NetworkEdge& edge, double t) {
 
 Result<NetworkTopology> network_topology(const SurfaceNetwork& network) {
   if (auto error = find_defect(network)) return fail(*std::move(error));
+
+  // An edge for each join, then one for each side of a rim.
   NetworkTopology topology;
   for (const Join& join : network.joins) topology.edges.push_back(edge_of(network, join));
   for (std::size_t r = 0; r < network.rims.size(); ++r) {
@@ -265,11 +278,13 @@ Result<NetworkTopology> network_topology(const SurfaceNetwork& network) {
   if (auto error = find_disagreeing_normals(network, topology.edges)) {
     return fail(*std::move(error));
   }
+
   const Corners corners = find_corners(network, topology.edges);
   make_vertices(corners, topology);
   for (const auto& sides : corners.sides) {
     topology.patch_loops.push_back(patch_loop(sides, topology.edges));
   }
+
   int first_edge = static_cast<int>(network.joins.size());
   for (const Rim& rim : network.rims) {
     Result<std::vector<LoopEdge>> loop = rim_loop(rim, first_edge, topology.edges);

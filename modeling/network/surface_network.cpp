@@ -41,12 +41,14 @@ std::optional<Error> find_patch_defect(const SurfaceNetwork& network, int number
     return defect("wrong number of control points", where, std::to_string(patch.control.size()),
                   std::to_string(wanted) + " are needed");
   }
+
   for (const int c : patch.control) {
     if (c < 0 || c >= network.control_points_mm.cols()) {
       return defect("control point outside the pool", where, std::to_string(c),
                     "0 to " + std::to_string(network.control_points_mm.cols() - 1));
     }
   }
+
   for (const KnotVector* knots : {&patch.u, &patch.v}) {
     if (knots->knots().front() != knots->first() || knots->knots().back() != knots->last()) {
       return defect("knot vector is not clamped", where, {}, "network patches have clamped ends");
@@ -68,6 +70,7 @@ std::optional<Error> find_cover_defect(const SurfaceNetwork& network, int number
     if (from != reached || !(to > from)) break;
     reached = to;
   }
+
   double covered = 0;
   for (const auto& [from, to] : uses) covered += to - from;
   if (reached == knots.last() && covered <= (knots.last() - knots.first()) * (1 + 1e-12)) {
@@ -86,6 +89,8 @@ std::optional<Error> find_rim_defect(const SurfaceNetwork& network, const Rim& r
   const auto ends = [&](const Side& s) {
     return std::array<Vec3, 2>{side_point(network, s, s.from), side_point(network, s, s.to)};
   };
+
+  // From either end of the first side on, always by the nearer end of the next one.
   const std::array<Vec3, 2> first = ends(rim.sides.front());
   for (const int start : {0, 1}) {
     Vec3 at = first[index(1 - start)];
@@ -118,6 +123,36 @@ std::optional<Error> find_rim_frame_defect(const Rim& rim) {
   return std::nullopt;
 }
 
+// Every part of every side in exactly one join or rim.
+std::optional<Error> find_side_defect(const SurfaceNetwork& network) {
+  std::vector<std::array<SideUse, 4>> uses(network.patches.size());
+  const auto use = [&](const Side& s) {
+    if (s.patch < 0 || index(s.patch) >= uses.size()) return false;
+    uses[index(s.patch)][static_cast<std::size_t>(s.side)].emplace_back(s.from, s.to);
+    return true;
+  };
+  for (std::size_t j = 0; j < network.joins.size(); ++j) {
+    if (!use(network.joins[j].a) || !use(network.joins[j].b)) {
+      return defect("join names a patch that is not there", "join " + std::to_string(j), {}, {});
+    }
+  }
+  for (const Rim& rim : network.rims) {
+    for (const Side& side : rim.sides) {
+      if (!use(side)) return defect("rim names a patch that is not there", rim.name, {}, {});
+    }
+  }
+
+  for (std::size_t p = 0; p < uses.size(); ++p) {
+    for (int side = 0; side < 4; ++side) {
+      if (auto error =
+              find_cover_defect(network, static_cast<int>(p), side, uses[p][index(side)])) {
+        return error;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 std::optional<Error> find_dependency_defect(const SurfaceNetwork& network) {
   const auto count = static_cast<std::size_t>(network.control_points_mm.cols());
   std::vector<char> dependent(count, 0);
@@ -133,6 +168,7 @@ std::optional<Error> find_dependency_defect(const SurfaceNetwork& network) {
     }
     dependent[index(point)] = 1;
   }
+
   for (std::size_t d = 0; d < network.dependencies.size(); ++d) {
     for (const auto& [master, weight] : network.dependencies[d].masters) {
       if (!in_pool(master) || dependent[index(master)] != 0 || !std::isfinite(weight)) {
@@ -164,6 +200,8 @@ AppendOffsets append(SurfaceNetwork& network, const SurfaceNetwork& part) {
     side.patch += offset.patch;
     return side;
   };
+
+  // The pool grows at its end, so that numbers of `network` stay what they are.
   network.control_points_mm.conservativeResize(Eigen::NoChange,
                                                offset.point + part.control_points_mm.cols());
   network.control_points_mm.rightCols(part.control_points_mm.cols()) = part.control_points_mm;
@@ -173,6 +211,7 @@ AppendOffsets append(SurfaceNetwork& network, const SurfaceNetwork& part) {
     patch.region += region;
     network.patches.push_back(std::move(patch));
   }
+
   for (const Join& join : part.joins) {
     network.joins.push_back({shifted(join.a), shifted(join.b), join.reversed});
   }
@@ -228,6 +267,7 @@ std::optional<Error> find_defect(const SurfaceNetwork& network) {
                     "coordinates are finite");
     }
   }
+
   for (const Region& region : network.regions) {
     if (region.name.empty())
       return defect("region has no name", "network", {}, "regions are named");
@@ -236,33 +276,13 @@ std::optional<Error> find_defect(const SurfaceNetwork& network) {
                     std::to_string(region.radius_mm), "radii are finite; 0 is unknown");
     }
   }
+
   for (std::size_t p = 0; p < network.patches.size(); ++p) {
     if (auto error = find_patch_defect(network, static_cast<int>(p))) return error;
   }
-  std::vector<std::array<SideUse, 4>> uses(network.patches.size());
-  const auto use = [&](const Side& s) {
-    if (s.patch < 0 || index(s.patch) >= uses.size()) return false;
-    uses[index(s.patch)][static_cast<std::size_t>(s.side)].emplace_back(s.from, s.to);
-    return true;
-  };
-  for (std::size_t j = 0; j < network.joins.size(); ++j) {
-    if (!use(network.joins[j].a) || !use(network.joins[j].b)) {
-      return defect("join names a patch that is not there", "join " + std::to_string(j), {}, {});
-    }
-  }
-  for (const Rim& rim : network.rims) {
-    for (const Side& side : rim.sides) {
-      if (!use(side)) return defect("rim names a patch that is not there", rim.name, {}, {});
-    }
-  }
-  for (std::size_t p = 0; p < uses.size(); ++p) {
-    for (int side = 0; side < 4; ++side) {
-      if (auto error =
-              find_cover_defect(network, static_cast<int>(p), side, uses[p][index(side)])) {
-        return error;
-      }
-    }
-  }
+  if (auto error = find_side_defect(network)) return error;
+
+  // Rims are asked last: their chains are followed over sides that are there.
   for (const Rim& rim : network.rims) {
     if (auto error = find_rim_frame_defect(rim)) return error;
     if (auto error = find_rim_defect(network, rim)) return error;

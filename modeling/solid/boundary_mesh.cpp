@@ -307,7 +307,9 @@ class Mesher {
           .cross(points_[index(c)] - points_[index(b)])
           .dot(normal);
     };
+
     while (polygon.size() > 3) {
+      // The first corner that turns the right way and has no other point in its triangle.
       const std::size_t n = polygon.size();
       std::size_t ear = 0;
       for (std::size_t k = 0; k < n; ++k) {

@@ -88,6 +88,7 @@ class Motion {
   // One time step of the method: (5.7) without mass, (5.17), (5.11) or (5.12) with it.
   void step() {
     const double dt = options_.time_step;
+
     switch (options_.method) {
       case DeformMethod::kSparse:
       case DeformMethod::kEulerSvd:

@@ -63,6 +63,8 @@ Result<ReproducedTable> smoothing(const ReproduceOptions& options, const Progres
   if (!rows) return fail(rows.error());
   ReproducedTable t;
   t.columns = {"constraints", "unknowns", "iterations", "seconds"};
+
+  // A row for each of the thesis's systems and ours; what is left of the angle goes to the trends.
   std::map<ThesisCase, double> left_deg;
   for (const ThesisSmoothingRow& row : *rows) {
     const TripleSystemReport& one = row.reports.front();
@@ -77,12 +79,15 @@ Result<ReproducedTable> smoothing(const ReproduceOptions& options, const Progres
                        {thesis[1], ours(one.unknowns)},
                        {thesis[2], ours(one.evaluations)},
                        {thesis[3], largest(row, &TripleSystemReport::seconds)}}});
+
     t.notes.push_back(
         fmt::format("{}, {}: {} patches, {} system{}, {:.3g} -> {:.2g} degrees{}", row.name,
                     row.method, row.patches, row.systems, row.systems == 1 ? "" : "s",
                     largest(row, &TripleSystemReport::before_deg), after, certificate(row)));
     left_deg[row.which] = after;
   }
+
+  // Smooth is within a hundredth of a degree everywhere.
   const double rough = left_deg[ThesisCase::kRough];
   const double level = left_deg[ThesisCase::kHeldLevel];
   const double held = left_deg[ThesisCase::kFittedHeld];

@@ -121,6 +121,7 @@ class Quartering {
       add_patch(near, p);
       add_patch(far, p);
     }
+
     // Quarters: low near, low far, high near, high far; halves of bodies: low, high.
     const int f = first_.back();
     if (is_cut(p)) {

@@ -215,6 +215,7 @@ class TripleSystem {
       *jacobian =
           Eigen::MatrixXd::Zero(constraints_, static_cast<Eigen::Index>(3 * columns_.size()));
     }
+
     Eigen::Index row = 0;
     for (const Boundary& boundary : boundaries_) {
       const Join& join = network_.joins[index(boundary.join)];

@@ -5,6 +5,7 @@
 
 #include "modeling/check/edge_measure.h"
 #include "modeling/check/face_measure.h"
+#include "modeling/check/rules.h"
 #include "modeling/check/self_intersection.h"
 #include "tests/shapes/crafted_networks.h"
 #include "tests/shapes/sample_networks.h"
@@ -76,6 +77,21 @@ TEST(TightBox, IsReachedAndNotLeftBySamples) {
   EXPECT_GE((high - highest).minCoeff(), -1e-9 * size);
   EXPECT_LT((lowest - low).maxCoeff(), 1e-3 * size);
   EXPECT_LT((high - highest).maxCoeff(), 1e-3 * size);
+}
+
+// A grid misses an extreme by less than the slack that decides which patches are searched further.
+TEST(TightBox, LooksFurtherThanAGridCanMiss) {
+  for (const SurfaceNetwork& network : {samples::bent_tube(), samples::torus()}) {
+    const BoundaryModel model = *boundary_of(network);
+    const auto coarse = measure_faces(model, kSteps, {}), fine = measure_faces(model, 40, {});
+    for (std::size_t f = 0; f < coarse.size(); ++f) {
+      if (!model.faces[f].patch) continue;
+      const double size = (fine[f].highest_mm - fine[f].lowest_mm).norm();
+      const double missed = std::max((coarse[f].lowest_mm - fine[f].lowest_mm).maxCoeff(),
+                                     (fine[f].highest_mm - coarse[f].highest_mm).maxCoeff());
+      EXPECT_LT(missed, 0.5 * check_rules::kGridSlack * size);
+    }
+  }
 }
 
 TEST(EdgeMeasures, SeeACreaseByItsAngleAndOnlyBetweenWalls) {

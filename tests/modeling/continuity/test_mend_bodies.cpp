@@ -5,6 +5,7 @@
 #include "base/random.h"
 #include "modeling/build/build_model.h"
 #include "modeling/continuity/mend_bodies.h"
+#include "modeling/continuity/rules.h"
 #include "tests/shapes/network_measures.h"
 
 namespace angiospline {
@@ -37,6 +38,11 @@ TEST(BodyRings, AreTheStripsAroundEachBody) {
   EXPECT_EQ(rings[0].strips.size(), network.patches.size());
   EXPECT_EQ(std::set<int>(rings[0].strips.begin(), rings[0].strips.end()).size(),
             rings[0].strips.size());
+
+  for (const int strip : rings[0].strips) {
+    EXPECT_EQ(network.patches[static_cast<std::size_t>(strip)].v.control_point_count(),
+              continuity_rules::kStripColumns);
+  }
 
   // A ring that is cut open is none.
   SurfaceNetwork open = network;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "modeling/network/rules.h"
 #include "modeling/network/tessellation_draft.h"
 #include "modeling/network/tessellation_edges.h"
 #include "tests/shapes/sample_networks.h"
@@ -64,6 +65,18 @@ TEST(ZipChains, OfReversedChainsAreTheMirrorImage) {
   sum = 0;
   for (const auto& t : back.triangles) sum += twice_area(back, t).z() / 2;
   EXPECT_NEAR(sum, -1.0, 1e-12);
+}
+
+TEST(AddCell, OfASquareIsCutTheSameWayWhateverTheLastBits) {
+  for (const double hair : {0.0, 0.4, -0.4}) {
+    TessellationDraft draft;
+    const double x = 1 + hair * network_rules::kDiagonalHair;
+    for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(x, x, 0), Vec3(0, 1, 0)}) {
+      draft.add_point({}, p);
+    }
+    draft.add_cell({0, 1, 2, 3}, 0);
+    EXPECT_EQ(draft.triangles[0], (std::array<int, 3>{0, 1, 2}));
+  }
 }
 
 TEST(AddCell, CutsAlongTheShorterDiagonal) {
@@ -141,6 +154,14 @@ TEST(TessellationEdges, GivesNeighboursTheSamePointsAndClosesRims) {
       }
     }
     EXPECT_GT(shared, 10);
+
+    // However coarse the demand, no two edges can share a segment.
+    for (int p = 0; p < static_cast<int>(network.patches.size()); ++p) {
+      for (const PatchSide side :
+           {PatchSide::kU0, PatchSide::kU1, PatchSide::kV0, PatchSide::kV1}) {
+        EXPECT_GT(std::ssize(edges.side_chain(p, side).points), network_rules::kLeastEdgeSegments);
+      }
+    }
 
     const auto loops = edges.rim_loops();
     ASSERT_EQ(loops.size(), network.rims.size());

@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "modeling/solid/network_closure.h"
+#include "modeling/solid/rules.h"
 #include "tests/shapes/crafted_networks.h"
 #include "tests/shapes/sample_networks.h"
 
@@ -111,6 +113,28 @@ TEST(JoinGaps, AreWhatTheSidesWereMovedApartBy) {
   const auto error = find_open_join(open.shape(), gaps);
   ASSERT_TRUE(error);
   EXPECT_NE(error->message().find(patch_title(network, 0)), std::string::npos) << error->message();
+}
+
+TEST(JoinGaps, OpenAJoinBeyondAShareOfItsRadiusWhateverTheScale) {
+  for (const double radius : {0.1, 1.0, 30.0}) {
+    for (const bool open : {false, true}) {
+      SurfaceNetwork network = samples::tube_with_t_vertex(radius, 5 * radius);
+      const Owned closed(network);
+      const int point = network.dependencies.front().point;
+      const auto widest = [&] {
+        const Owned owned(network);
+        const std::vector<double> gaps = join_gaps_mm(owned.shape());
+        return *std::max_element(gaps.begin(), gaps.end());
+      };
+      // Gaps grow in proportion to the move: scaled to just below and above the rule.
+      network.control_points_mm.col(point) += Vec3(0, 0, radius);
+      const double share = (open ? 1.01 : 0.99) * solid_rules::kLargestGap * radius / widest();
+      network = closed.network;
+      network.control_points_mm.col(point) += Vec3(0, 0, share * radius);
+      const Owned moved(network);
+      EXPECT_EQ(find_open_join(moved.shape(), join_gaps_mm(moved.shape())).has_value(), open);
+    }
+  }
 }
 
 }  // namespace

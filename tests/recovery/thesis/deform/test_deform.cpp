@@ -12,6 +12,7 @@
 #include "modeling/build/build_model.h"
 #include "recovery/phantoms/phantom.h"
 #include "recovery/thesis/deform/potentials.h"
+#include "recovery/thesis/deform/rules.h"
 #include "recovery/thesis/deform/solver.h"
 #include "recovery/thesis/deform/system.h"
 #include "recovery/thesis/experiments/slice.h"
@@ -381,6 +382,7 @@ TEST(Deform, LargeMeshesComeToRestWithoutAFactor) {
   const int rows = 90, columns = 120;
   const double radius = columns / (2 * kPi);
   const DeformMesh start = tube(rows, columns, radius, 1);
+  ASSERT_GT(start.node_count(), deform_rules::kMostFactorised);
   const EdgePoints edges = ring_of_edges(Vec3::Zero(), radius + 0.5, columns, 1, rows);
   const auto fit = deform(start, edges, 1);
   ASSERT_TRUE(fit) << fit.error().message();

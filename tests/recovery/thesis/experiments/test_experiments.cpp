@@ -7,8 +7,11 @@
 #include "recovery/imaging/rasterize/mask_inside.h"
 #include "recovery/imaging/rasterize/shapes.h"
 #include "recovery/thesis/deform/mesh.h"
+#include "recovery/thesis/experiments/printed_contours.h"
 #include "recovery/thesis/experiments/reproduce.h"
+#include "recovery/thesis/experiments/rules.h"
 #include "recovery/thesis/experiments/slice.h"
+#include "recovery/thesis/experiments/tables.h"
 
 namespace angiospline {
 namespace {
@@ -80,6 +83,45 @@ TEST(ArterySlice, HasArteriesAsLargeAsTheThesis) {
   EXPECT_NEAR(static_cast<double>(voxels(slice.left.truth)), 158, 3);
   EXPECT_EQ(slice.image.voxels, artery_slice(8, 1).image.voxels);
   EXPECT_NE(slice.image.voxels, artery_slice(8, 2).image.voxels);
+}
+
+// Table 7.4 states means and a deviation over the rows that it does not star.
+TEST(PrintedContours, HaveTheAveragesThatTheThesisPrints) {
+  double iterations = 0, missed = 0, squares = 0;
+  for (const std::size_t k : {0U, 1U, 2U, 3U, 4U, 5U, 6U, 7U, 8U, 12U, 13U, 14U}) {
+    iterations += experiments::kStartPositions[k].printed.iterations / 12;
+    missed += experiments::kStartPositions[k].printed.missed / 12;
+    squares += std::pow(experiments::kStartPositions[k].printed.missed, 2) / 12;
+  }
+  EXPECT_NEAR(iterations, 55.8, 0.06);
+  EXPECT_NEAR(missed, 20.8, 0.06);
+  EXPECT_NEAR(std::sqrt(squares - missed * missed), 3.2, 0.2);
+  double of_sizes = 0;
+  for (const auto& s : experiments::kStartSizes) of_sizes += s.printed.missed / 8;
+  EXPECT_NEAR(of_sizes, 18.6, 0.06);
+  // The same circle stands in both halves of the table.
+  EXPECT_EQ(experiments::kStartSizes[3].printed.missed,
+            experiments::kStartPositions[0].printed.missed);
+}
+
+TEST(Reproduce, QuickContoursStopEarly) {
+  ReproduceOptions quick;
+  quick.quick = true;
+  const auto table = reproduce_table("7.4", quick);
+  ASSERT_TRUE(table) << table.error().message();
+  ASSERT_EQ(table->rows.size(), 3U);
+  for (const ReproducedRow& row : table->rows) {
+    for (std::size_t c = 0; c < row.figures.size(); c += 2) {
+      EXPECT_LE(*row.figures[c].ours, experiment_rules::kQuickContour);
+      EXPECT_EQ(row.figures[c].thesis.has_value(), c == 0);
+    }
+  }
+}
+
+TEST(Listed, SeparatesFiguresByCommas) {
+  EXPECT_EQ(experiments::listed({12, 15.26, 18}, 1), "12.0, 15.3, 18.0");
+  EXPECT_EQ(experiments::listed({7}), "7");
+  EXPECT_EQ(experiments::listed({}), "");
 }
 
 TEST(Reproduce, QuickTablesAreFilled) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "recovery/thesis/smoothing/corner_tangents.h"
+#include "recovery/thesis/smoothing/rules.h"
 #include "recovery/thesis/smoothing/thesis_smoothing.h"
 
 namespace angiospline {
@@ -45,6 +46,9 @@ TEST(FlattenCorner, GivesAllPatchesThereOneNormalAndMovesOnlyTheNextPoints) {
     for (const int j : joins) {
       const Join& join = cut.network.joins[static_cast<std::size_t>(j)];
       const Patch& patch = cut.network.patches[static_cast<std::size_t>(join.a.patch)];
+      // Bi-quintic patches without inner knots, as the systems' sizes rest on.
+      ASSERT_EQ(patch.u.control_point_count(), thesis_smoothing_rules::kPatchRows);
+      ASSERT_EQ(patch.v.control_point_count(), thesis_smoothing_rules::kPatchRows);
       SurfaceNetwork network = cut.network;
       const int corner = patch.control.back();
       const std::vector<Vec3> before = normals_at(network, corner);
