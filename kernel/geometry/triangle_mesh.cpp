@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include <Eigen/Geometry>
+
+#include "base/disjoint_sets.h"
+#include "base/index.h"
 
 namespace angiospline {
 namespace {
@@ -38,30 +40,9 @@ std::vector<HalfEdge> sorted_half_edges(const TriangleMesh& mesh) {
   return edges;
 }
 
-int root(std::vector<int>& parent, int i) {
-  while (parent[static_cast<std::size_t>(i)] != i) {
-    int& p = parent[static_cast<std::size_t>(i)];
-    p = parent[static_cast<std::size_t>(p)];
-    i = p;
-  }
-  return i;
-}
-
-void unite(std::vector<int>& parent, int a, int b) {
-  a = root(parent, a);
-  b = root(parent, b);
-  if (a != b) parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
-}
-
-std::vector<int> identity(std::size_t n) {
-  std::vector<int> parent(n);
-  std::iota(parent.begin(), parent.end(), 0);
-  return parent;
-}
-
-// Corners (3 t + k) united over shared edges: as many classes at a point as it has fans.
+// Corners (3 t + k) joined over shared edges: as many classes at a point as it has fans.
 int count_points_of_several_fans(const TriangleMesh& mesh, const std::vector<HalfEdge>& edges) {
-  std::vector<int> parent = identity(static_cast<std::size_t>(3 * mesh.triangles.cols()));
+  DisjointSets fan_of_corner(index(3 * mesh.triangles.cols()));
   const auto corner = [&](int triangle, int point) {
     for (int k = 0; k < 3; ++k) {
       if (mesh.triangles(k, triangle) == point) return 3 * triangle + k;
@@ -71,12 +52,12 @@ int count_points_of_several_fans(const TriangleMesh& mesh, const std::vector<Hal
   for (std::size_t i = 1; i < edges.size(); ++i) {
     if (!same_edge(edges[i - 1], edges[i])) continue;
     for (const int point : {edges[i].low, edges[i].high}) {
-      unite(parent, corner(edges[i - 1].triangle, point), corner(edges[i].triangle, point));
+      fan_of_corner.join(corner(edges[i - 1].triangle, point), corner(edges[i].triangle, point));
     }
   }
   std::vector<int> fans(static_cast<std::size_t>(mesh.points_mm.cols()), 0);
-  for (int c = 0; c < static_cast<int>(parent.size()); ++c) {
-    if (root(parent, c) == c) ++fans[static_cast<std::size_t>(mesh.triangles(c % 3, c / 3))];
+  for (int c = 0; c < static_cast<int>(fan_of_corner.size()); ++c) {
+    if (fan_of_corner.root(c) == c) ++fans[index(mesh.triangles(c % 3, c / 3))];
   }
   return static_cast<int>(std::count_if(fans.begin(), fans.end(), [](int n) { return n > 1; }));
 }
@@ -146,16 +127,18 @@ PartKind part_kind_of_name(std::string_view name) {
 }
 
 std::vector<int> components_of_triangles(const TriangleMesh& mesh) {
-  std::vector<int> parent = identity(static_cast<std::size_t>(mesh.points_mm.cols()));
+  DisjointSets joined(index(mesh.points_mm.cols()));
   for (int t = 0; t < mesh.triangles.cols(); ++t) {
-    unite(parent, mesh.triangles(0, t), mesh.triangles(1, t));
-    unite(parent, mesh.triangles(1, t), mesh.triangles(2, t));
+    joined.join(mesh.triangles(0, t), mesh.triangles(1, t));
+    joined.join(mesh.triangles(1, t), mesh.triangles(2, t));
   }
-  std::vector<int> number(parent.size(), -1);
+
+  // Numbers go by the first triangle, not by the lowest point: points without one have none.
+  std::vector<int> number(joined.size(), -1);
   std::vector<int> component;
   int count = 0;
   for (int t = 0; t < mesh.triangles.cols(); ++t) {
-    int& n = number[static_cast<std::size_t>(root(parent, mesh.triangles(0, t)))];
+    int& n = number[index(joined.root(mesh.triangles(0, t)))];
     if (n < 0) n = count++;
     component.push_back(n);
   }

@@ -12,6 +12,8 @@
 #include <tbb/parallel_for.h>
 
 #include "base/contract.h"
+#include "base/disjoint_sets.h"
+#include "base/index.h"
 #include "kernel/geometry/triangle_tree.h"
 
 namespace angiospline {
@@ -123,21 +125,16 @@ int open_loops(const TriangleMesh& mesh) {
   for (const auto& t : mesh.triangles.colwise()) {
     for (int k = 0; k < 3; ++k) ++uses[std::minmax(t[k], t[(k + 1) % 3])];
   }
-  std::map<int, int> parent;
-  const auto root = [&](int i) {
-    parent.try_emplace(i, i);
-    while (parent[i] != i) i = parent[i];
-    return i;
-  };
+
+  DisjointSets loops(index(mesh.points_mm.cols()));
+  std::vector<char> on_loop(loops.size(), 0);
   for (const auto& [edge, count] : uses) {
     if (count != 1) continue;
-    const int a = root(edge.first);
-    const int b = root(edge.second);
-    if (a != b) parent[std::max(a, b)] = std::min(a, b);
+    loops.join(edge.first, edge.second);
+    on_loop[index(edge.first)] = on_loop[index(edge.second)] = 1;
   }
-  int loops = 0;
-  for (const auto& [point, up] : parent) loops += point == up ? 1 : 0;
-  return loops;
+  const auto inside = std::count(on_loop.begin(), on_loop.end(), char{0});
+  return loops.count() - static_cast<int>(inside);
 }
 
 std::array<int, 3> caps(const TriangleMesh& mesh) {

@@ -1,42 +1,12 @@
 #include "modeling/network/network_topology.h"
 
 #include <algorithm>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "base/index.h"
 
 namespace angiospline {
 namespace {
-
-class DisjointSets {
- public:
-  explicit DisjointSets(int count) : parent_(index(count)) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int find(int i) {
-    while (parent_[index(i)] != i) i = parent_[index(i)] = parent_[index(parent_[index(i)])];
-    return i;
-  }
-  void unite(int a, int b) {
-    a = find(a);
-    b = find(b);
-    if (a != b) parent_[index(std::max(a, b))] = std::min(a, b);  // the lowest index is the root
-  }
-  // Classes numbered in order of their lowest member.
-  std::vector<int> numbers(int& count) {
-    std::vector<int> number(parent_.size(), -1);
-    count = 0;
-    for (std::size_t i = 0; i < parent_.size(); ++i) {
-      const int root = find(static_cast<int>(i));
-      if (number[index(root)] < 0) number[index(root)] = count++;
-      number[i] = number[index(root)];
-    }
-    return number;
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 const KnotVector& knots_along(const Patch& patch, PatchSide side) {
   return side == PatchSide::kU0 || side == PatchSide::kU1 ? patch.v : patch.u;
@@ -141,17 +111,17 @@ void make_vertices(const Corners& corners, NetworkTopology& topology) {
       }
     }
   }
-  DisjointSets sets(static_cast<int>(corners.positions_mm.cols()));
+  DisjointSets sets(index(corners.positions_mm.cols()));
   for (std::size_t e = 0; e < ends.size(); ++e) {
     if (!topology.edges[e].is_join()) continue;
     const std::size_t swap = topology.edges[e].reversed ? 1 : 0;
-    sets.unite(ends[e][0][0], ends[e][1][swap]);
-    sets.unite(ends[e][0][1], ends[e][1][1 - swap]);
+    sets.join(ends[e][0][0], ends[e][1][swap]);
+    sets.join(ends[e][0][1], ends[e][1][1 - swap]);
   }
-  int count = 0;
-  const std::vector<int> vertex = sets.numbers(count);
 
   // A vertex lies at the mean of its corners, and knows how far they are from it.
+  const int count = sets.count();
+  const std::vector<int> vertex = sets.numbers();
   topology.vertices_mm = Points3::Zero(3, count);
   topology.vertex_gaps_mm.assign(index(count), 0.0);
   Eigen::VectorXd members = Eigen::VectorXd::Zero(count);
@@ -244,12 +214,13 @@ Result<std::vector<LoopEdge>> rim_loop(const Rim& rim, int first_edge,
 }
 
 void find_components(const SurfaceNetwork& network, NetworkTopology& topology) {
-  DisjointSets sets(static_cast<int>(network.patches.size()));
-  for (const Join& join : network.joins) sets.unite(join.a.patch, join.b.patch);
+  DisjointSets sets(network.patches.size());
+  for (const Join& join : network.joins) sets.join(join.a.patch, join.b.patch);
   for (const Rim& rim : network.rims) {
-    for (const Side& side : rim.sides) sets.unite(side.patch, rim.sides.front().patch);
+    for (const Side& side : rim.sides) sets.join(side.patch, rim.sides.front().patch);
   }
-  topology.components = sets.numbers(topology.component_count);
+  topology.components = sets.numbers();
+  topology.component_count = sets.count();
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #include "modeling/network/tessellation_edges.h"
 
 #include <algorithm>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "base/index.h"
 #include "modeling/network/rules.h"
 
@@ -69,17 +69,7 @@ void TessellationEdges::collect() {
 // Ends of edges are identified by combinatorics alone: neighbours on a side, sides at a corner of
 // a patch, and the two sides of a join. Distances play no part, so no gap can open.
 void TessellationEdges::number_corners() {
-  std::vector<int> parent(2 * edges_.size());  // end 2 e + (0 start, 1 end) of edge e
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[index(i)] != i) i = parent[index(i)] = parent[index(parent[index(i)])];
-    return i;
-  };
-  const auto unite = [&](int a, int b) {
-    a = root(a);
-    b = root(b);
-    parent[index(std::max(a, b))] = std::min(a, b);
-  };
+  DisjointSets ends(2 * edges_.size());  // end 2 e + (0 start, 1 end) of edge e
 
   // The end of a use at the low (0) or high (1) parameter of the patch's side.
   const auto end_of = [&](const Use& u, int high) {
@@ -90,22 +80,22 @@ void TessellationEdges::number_corners() {
   for (const auto& sides : uses_) {
     for (const auto& uses : sides) {
       for (std::size_t k = 1; k < uses.size(); ++k)
-        unite(end_of(uses[k - 1], 1), end_of(uses[k], 0));
+        ends.join(end_of(uses[k - 1], 1), end_of(uses[k], 0));
     }
     const auto& [u0, u1, v0, v1] = sides;
-    unite(end_of(u0.front(), 0), end_of(v0.front(), 0));
-    unite(end_of(u0.back(), 1), end_of(v1.front(), 0));
-    unite(end_of(u1.front(), 0), end_of(v0.back(), 1));
-    unite(end_of(u1.back(), 1), end_of(v1.back(), 1));
+    ends.join(end_of(u0.front(), 0), end_of(v0.front(), 0));
+    ends.join(end_of(u0.back(), 1), end_of(v1.front(), 0));
+    ends.join(end_of(u1.front(), 0), end_of(v0.back(), 1));
+    ends.join(end_of(u1.back(), 1), end_of(v1.back(), 1));
   }
 
   // A point for each class of ends, where the first of its edges has it.
-  std::vector<int> number(parent.size(), -1);
+  std::vector<int> number(ends.size(), -1);
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const Side& side = edges_[e].join.a;
     edges_[e].points.resize(2);
     for (const int end : {0, 1}) {
-      int& n = number[index(root(2 * static_cast<int>(e) + end))];
+      int& n = number[index(ends.root(2 * static_cast<int>(e) + end))];
       if (n < 0) n = add_point(side, end == 0 ? side.from : side.to);
       edges_[e].points[index(end)] = n;
     }

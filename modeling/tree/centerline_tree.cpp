@@ -1,8 +1,8 @@
 #include "modeling/tree/centerline_tree.h"
 
 #include <algorithm>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "base/index.h"
 
 namespace angiospline {
@@ -16,25 +16,9 @@ std::vector<std::vector<int>> branches_at_nodes(const CenterlineTree& tree) {
 }
 
 std::vector<int> components_of_nodes(const CenterlineTree& tree) {
-  std::vector<int> parent(tree.nodes.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int n) {
-    while (parent[index(n)] != n) n = parent[index(n)] = parent[index(parent[index(n)])];
-    return n;
-  };
-  for (const CenterlineBranch& branch : tree.branches) {
-    const int a = root(branch.from);
-    const int b = root(branch.to);
-    parent[index(std::max(a, b))] = std::min(a, b);  // the lowest node stays the root
-  }
-  std::vector<int> component(tree.nodes.size(), -1);
-  int count = 0;
-  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
-    const int r = root(static_cast<int>(n));
-    if (component[index(r)] < 0) component[index(r)] = count++;
-    component[n] = component[index(r)];
-  }
-  return component;
+  DisjointSets joined(tree.nodes.size());
+  for (const CenterlineBranch& branch : tree.branches) joined.join(branch.from, branch.to);
+  return joined.numbers();
 }
 
 int component_count(const CenterlineTree& tree) {

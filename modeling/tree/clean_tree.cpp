@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "base/disjoint_sets.h"
 #include "base/index.h"
 
 namespace angiospline {
@@ -157,12 +157,7 @@ class Cleaner {
   }
 
   void contract_branches_without_length() {
-    std::vector<int> node(tree_.nodes.size());
-    std::iota(node.begin(), node.end(), 0);
-    const auto find = [&](int n) {
-      while (node[index(n)] != n) n = node[index(n)] = node[index(node[index(n)])];
-      return n;
-    };
+    DisjointSets nodes(tree_.nodes.size());
     for (std::size_t b = 0; b < tree_.branches.size(); ++b) {
       if (!alive_[b]) continue;
       const CenterlineBranch& branch = tree_.branches[b];
@@ -174,19 +169,17 @@ class Cleaner {
                                    kSamePoint * branch.radii_mm.minCoeff());
       if (has_length) continue;
       alive_[b] = false;
-      const int from = find(branch.from);
-      const int to = find(branch.to);
-      node[index(std::max(from, to))] = std::min(from, to);
+      nodes.join(branch.from, branch.to);
       warnings_.push_back({WarningCode::kBranchWithoutLength,
                            fmt::format("branch {} has no length: dropped", branch.name)});
     }
     for (CenterlineBranch& branch : tree_.branches) {
-      branch.from = find(branch.from);
-      branch.to = find(branch.to);
+      branch.from = nodes.root(branch.from);
+      branch.to = nodes.root(branch.to);
       branch.points_mm.col(0) = tree_.nodes[index(branch.from)].position_mm;
       branch.points_mm.rightCols(1) = tree_.nodes[index(branch.to)].position_mm;
     }
-    for (int& inlet : tree_.inlets) inlet = find(inlet);
+    for (int& inlet : tree_.inlets) inlet = nodes.root(inlet);
   }
 
   bool drop_spurs() {

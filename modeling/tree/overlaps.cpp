@@ -6,11 +6,11 @@
 #include <cstdint>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <unordered_map>
 
 #include <fmt/format.h>
 
+#include "base/disjoint_sets.h"
 #include "base/index.h"
 
 namespace angiospline {
@@ -156,22 +156,18 @@ std::vector<int> clusters(const SmoothedTree& tree) {
     width[index(branch.from)] = std::max(width[index(branch.from)], tree.paths[b].at(0.0)(3));
     width[index(branch.to)] = std::max(width[index(branch.to)], tree.paths[b].at(last)(3));
   }
-  std::vector<int> parent(width.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&](int n) {
-    while (parent[index(n)] != n) n = parent[index(n)] = parent[index(parent[index(n)])];
-    return n;
-  };
+
+  DisjointSets joined(width.size());
   for (std::size_t b = 0; b < tree.paths.size(); ++b) {
     const CenterlineBranch& branch = tree.tree.branches[b];
     const double wide = width[index(branch.from)] + width[index(branch.to)];
     if (tree.paths[b].knots().last() > kShortBranch * wide) continue;
-    const int u = find(branch.from);
-    const int v = find(branch.to);
-    parent[index(std::max(u, v))] = std::min(u, v);
+    joined.join(branch.from, branch.to);
   }
-  for (std::size_t n = 0; n < parent.size(); ++n) parent[n] = find(static_cast<int>(n));
-  return parent;
+
+  std::vector<int> lowest;
+  for (std::size_t n = 0; n < width.size(); ++n) lowest.push_back(joined.root(static_cast<int>(n)));
+  return lowest;
 }
 
 struct Contact {
@@ -248,7 +244,8 @@ double way_over_radii(const SmoothedTree& tree, const PathContact& c) {
 
 }  // namespace
 
-std::vector<PathContact> find_path_contacts(const SmoothedTree& tree, const OverlapOptions& options) {
+std::vector<PathContact> find_path_contacts(const SmoothedTree& tree,
+                                            const OverlapOptions& options) {
   const std::vector<Capsule> capsules = capsules_of(tree);
   std::vector<int> count(tree.paths.size(), 0);
   for (const Capsule& c : capsules) ++count[index(c.branch)];

@@ -10,34 +10,13 @@
 #include <fmt/format.h>
 
 #include "base/contract.h"
+#include "base/disjoint_sets.h"
 #include "base/index.h"
 
 namespace angiospline {
 namespace {
 
 constexpr int kNamedJoins = 8;  // joined ends that are listed by name
-
-// Union-find whose representative is the lowest member.
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int of(int i) {
-    while (parent_[index(i)] != i) i = parent_[index(i)] = parent_[index(parent_[index(i)])];
-    return i;
-  }
-  bool join(int a, int b) {
-    a = of(a);
-    b = of(b);
-    if (a == b) return false;
-    parent_[index(std::max(a, b))] = std::min(a, b);
-    return true;
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 // For each point the edges at it, as one flat list (compressed rows).
 class Incidence {
@@ -117,8 +96,8 @@ class TreeBuilder {
     const std::size_t count = graph_.points.size();
     std::vector<std::vector<int>> neighbours(count);
     for (const auto& [a, b] : graph_.edges) {
-      const int ga = groups_.of(a);
-      const int gb = groups_.of(b);
+      const int ga = groups_.root(a);
+      const int gb = groups_.root(b);
       if (ga == gb) continue;
       neighbours[index(ga)].push_back(gb);
       neighbours[index(gb)].push_back(ga);
@@ -132,10 +111,10 @@ class TreeBuilder {
     while (!work.empty()) {
       const int g = work.back();
       work.pop_back();
-      if (groups_.of(g) != g || neighbours[index(g)].size() < 2) continue;
+      if (groups_.root(g) != g || neighbours[index(g)].size() < 2) continue;
       around.clear();
       for (const int n : neighbours[index(g)]) {
-        const int other = groups_.of(n);
+        const int other = groups_.root(n);
         if (other != g) around.emplace_back(key_of(position(other)), other);
       }
       std::sort(around.begin(), around.end());
@@ -145,11 +124,11 @@ class TreeBuilder {
       for (const auto& [key, other] : around) kept.push_back(other);
       for (std::size_t i = 1; i < around.size(); ++i) {
         if (around[i].first != around[i - 1].first) continue;
-        const int a = groups_.of(around[i - 1].second);
-        const int b = groups_.of(around[i].second);
+        const int a = groups_.root(around[i - 1].second);
+        const int b = groups_.root(around[i].second);
         if (!groups_.join(a, b)) continue;
         ++joined;
-        const int winner = groups_.of(a);
+        const int winner = groups_.root(a);
         const int loser = winner == a ? b : a;
         auto& to = neighbours[index(winner)];
         auto& from = neighbours[index(loser)];
@@ -167,8 +146,8 @@ class TreeBuilder {
   void join_ends() {
     std::vector<int> degree(graph_.points.size(), 0);
     for (const auto& [a, b] : graph_.edges) {
-      const int ga = groups_.of(a);
-      const int gb = groups_.of(b);
+      const int ga = groups_.root(a);
+      const int gb = groups_.root(b);
       if (ga == gb) continue;
       ++degree[index(ga)];
       ++degree[index(gb)];
@@ -176,7 +155,7 @@ class TreeBuilder {
     std::vector<std::pair<Key, int>> places;
     for (std::size_t p = 0; p < graph_.points.size(); ++p) {
       const int g = static_cast<int>(p);
-      if (groups_.of(g) == g && degree[p] > 0) places.emplace_back(key_of(position(g)), g);
+      if (groups_.root(g) == g && degree[p] > 0) places.emplace_back(key_of(position(g)), g);
     }
     std::sort(places.begin(), places.end());
     int joined = 0;
@@ -208,8 +187,8 @@ class TreeBuilder {
   void collect_edges() {
     std::vector<std::tuple<int, int, int>> sorted;
     for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
-      const int a = groups_.of(graph_.edges[e].first);
-      const int b = groups_.of(graph_.edges[e].second);
+      const int a = groups_.root(graph_.edges[e].first);
+      const int b = groups_.root(graph_.edges[e].second);
       if (a != b) sorted.emplace_back(std::min(a, b), std::max(a, b), static_cast<int>(e));
     }
     std::sort(sorted.begin(), sorted.end());
@@ -226,7 +205,7 @@ class TreeBuilder {
       const auto& [a, b] = graph_.edges[index(e)];
       const int line = graph_.line_of_edge.empty() ? -1 : graph_.line_of_edge[index(e)];
       const double radius = graph_.edge_radii_mm.empty() ? 0.0 : graph_.edge_radii_mm[index(e)];
-      edges_.push_back({groups_.of(a), groups_.of(b), a, b, line, radius});
+      edges_.push_back({groups_.root(a), groups_.root(b), a, b, line, radius});
     }
   }
 
@@ -236,7 +215,7 @@ class TreeBuilder {
     int lonely = 0;
     std::vector<bool> used(graph_.points.size(), false);
     for (const Edge& e : edges_) used[index(e.a)] = used[index(e.b)] = true;
-    for (std::size_t p = 0; p < used.size(); ++p) lonely += !used[index(groups_.of(int(p)))];
+    for (std::size_t p = 0; p < used.size(); ++p) lonely += !used[index(groups_.root(int(p)))];
     say(lonely, "point without a branch", "points without a branch", "dropped");
   }
 
@@ -293,8 +272,8 @@ class TreeBuilder {
       std::reverse(radii.begin(), radii.end());
     }
     CenterlineBranch branch;
-    branch.from = node_of_[index(groups_.of(members.front()))];
-    branch.to = node_of_[index(groups_.of(members.back()))];
+    branch.from = node_of_[index(groups_.root(members.front()))];
+    branch.to = node_of_[index(groups_.root(members.back()))];
     branch.points_mm.resize(3, static_cast<Eigen::Index>(members.size()));
     branch.radii_mm.resize(static_cast<Eigen::Index>(members.size()));
     for (std::size_t i = 0; i < members.size(); ++i) {
@@ -318,7 +297,7 @@ class TreeBuilder {
     std::vector<bool> has_inlet(tree_.nodes.size(), false);  // by component
     std::set<int> inlets;
     for (const int root : graph_.roots) {
-      const int n = node_of_[index(groups_.of(root))];
+      const int n = node_of_[index(groups_.root(root))];
       if (n < 0 || at[index(n)].size() != 1) continue;
       inlets.insert(n);
       has_inlet[index(component[index(n)])] = true;
@@ -397,7 +376,7 @@ class TreeBuilder {
   }
 
   const PointGraph& graph_;
-  Groups groups_;
+  DisjointSets groups_;
   CenterlineTree tree_;
   std::vector<Edge> edges_;
   std::vector<std::pair<int, int>> pairs_;

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
+#include "base/index.h"
 #include "recovery/imaging/mask/foreground.h"
 
 namespace angiospline {
@@ -70,7 +71,7 @@ int end_of_stretch(const std::uint8_t* row, int x, int count, bool foreground) {
 // A stretch of equal voxels in one row: [begin, end).
 struct Run {
   int begin, end;
-  int component;  // a node of the union-find forest, then the component's number
+  int component;
 };
 
 // Components of one class of a mask, held as runs: memory by the number of runs, not of voxels.
@@ -91,14 +92,6 @@ class RunComponents {
   }
 
  private:
-  int root(int k) {
-    while (parent_[static_cast<std::size_t>(k)] != k) {
-      int& p = parent_[static_cast<std::size_t>(k)];
-      p = parent_[static_cast<std::size_t>(p)];
-      k = p;
-    }
-    return k;
-  }
   void add_row(const std::uint8_t* values, int width, const RowExtent& extent, bool foreground);
   void join_rows(std::size_t a, std::size_t b, int reach);
   void number(const ImageGrid& grid);
@@ -106,14 +99,14 @@ class RunComponents {
   std::size_t width_;
   std::vector<Run> runs_;
   std::vector<std::size_t> row_begin_;
-  std::vector<int> parent_;
+  DisjointSets joined_;  // runs
   std::vector<Component> list_;
 };
 
 void RunComponents::add_row(const std::uint8_t* values, int width, const RowExtent& extent,
                             bool foreground) {
   const auto add = [&](int begin, int end) {
-    if (begin < end) runs_.push_back({begin, end, static_cast<int>(runs_.size())});
+    if (begin < end) runs_.push_back({begin, end, -1});
   };
   if (!foreground) add(0, extent.empty() ? width : extent.begin);
   for (int x = extent.begin; x < extent.end;) {
@@ -133,10 +126,8 @@ void RunComponents::join_rows(std::size_t a, std::size_t b, int reach) {
   std::size_t i = row_begin_[a], j = row_begin_[b];
   while (i < row_begin_[a + 1] && j < row_begin_[b + 1]) {
     const Run &p = runs_[i], &q = runs_[j];
-    if (p.begin < q.end + reach && q.begin < p.end + reach) {
-      const int rp = root(p.component), rq = root(q.component);
-      parent_[static_cast<std::size_t>(std::max(rp, rq))] = std::min(rp, rq);
-    }
+    if (p.begin < q.end + reach && q.begin < p.end + reach)
+      joined_.join(static_cast<int>(i), static_cast<int>(j));
     if (p.end < q.end)
       ++i;
     else
@@ -155,8 +146,8 @@ RunComponents::RunComponents(const Mask& mask, bool foreground, Neighbours neigh
     add_row(mask.voxels.data() + row * width_, n[0], extents[row], foreground);
     row_begin_.push_back(runs_.size());
   }
-  parent_.resize(runs_.size());
-  std::iota(parent_.begin(), parent_.end(), 0);
+
+  joined_ = DisjointSets(runs_.size());
   // Rows already seen that touch row (y, z); `reach` lets a run touch diagonally along x.
   for (int z = 0; z < n[2]; ++z)
     for (int y = 0; y < n[1]; ++y)
@@ -172,8 +163,8 @@ RunComponents::RunComponents(const Mask& mask, bool foreground, Neighbours neigh
   number(mask.grid);
 }
 
-// Replaces forest nodes by component numbers in order of the lowest offset (runs are in that order,
-// and the root of a tree is its lowest run), and gathers what is known of each.
+// Numbers components in order of the lowest offset (runs are in that order, and the root of a class
+// is its lowest run), and gathers what is known of each.
 void RunComponents::number(const ImageGrid& grid) {
   std::vector<int> number_of(runs_.size(), -1);
   const auto height = static_cast<std::size_t>(grid.size[1]);
@@ -181,7 +172,7 @@ void RunComponents::number(const ImageGrid& grid) {
     const int y = static_cast<int>(row % height), z = static_cast<int>(row / height);
     const bool edge_row = y == 0 || z == 0 || y == grid.size[1] - 1 || z == grid.size[2] - 1;
     for (std::size_t r = row_begin_[row]; r < row_begin_[row + 1]; ++r) {
-      int& k = number_of[static_cast<std::size_t>(root(static_cast<int>(r)))];
+      int& k = number_of[index(joined_.root(static_cast<int>(r)))];
       if (k < 0) {
         k = static_cast<int>(list_.size());
         list_.push_back({0, {runs_[r].begin, y, z}, false});
@@ -192,8 +183,7 @@ void RunComponents::number(const ImageGrid& grid) {
       runs_[r].component = k;
     }
   }
-  parent_.clear();
-  parent_.shrink_to_fit();
+  joined_ = DisjointSets();
 }
 
 template <typename Keep>

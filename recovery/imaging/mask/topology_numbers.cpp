@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <functional>
-#include <numeric>
 #include <vector>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
+#include "base/disjoint_sets.h"
 #include "recovery/imaging/mask/foreground.h"
 
 namespace angiospline {
@@ -86,7 +86,7 @@ class RunPieces {
         foreground_(foreground),
         reach_(connectivity == Connectivity::k26 ? 1 : 0) {
     const Voxel n = mask.grid.size;
-    parent_.push_back(0);  // piece 0 is the outside
+    pieces_.add();  // piece 0 is the outside
     row_begin_.assign(static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]) + 1, 0);
     for (int z = 0; z < n[2]; ++z)
       for (int y = 0; y < n[1]; ++y) {
@@ -100,16 +100,12 @@ class RunPieces {
   }
 
   // Pieces apart from the outside.
-  std::int64_t count() const {
-    std::int64_t roots = 0;
-    for (std::size_t i = 1; i < parent_.size(); ++i) roots += parent_[i] == i ? 1 : 0;
-    return roots;
-  }
+  std::int64_t count() const { return pieces_.count() - 1; }
 
  private:
   struct Run {
     int begin, end;
-    std::size_t piece;
+    int piece;
   };
 
   std::size_t row_index(int y, int z) const {
@@ -144,8 +140,7 @@ class RunPieces {
   }
 
   void add_piece(int begin, int end, bool is_outside) {
-    runs_.push_back({begin, end, is_outside ? 0 : parent_.size()});
-    if (!is_outside) parent_.push_back(parent_.size());
+    runs_.push_back({begin, end, is_outside ? 0 : pieces_.add()});
   }
 
   void join(int y, int z, int other_y, int other_z) {
@@ -156,7 +151,7 @@ class RunPieces {
     const std::size_t b_end = row_begin_[row_index(other_y, other_z) + 1];
     while (a < a_end && b < b_end) {
       if (runs_[a].begin < runs_[b].end + reach_ && runs_[b].begin < runs_[a].end + reach_)
-        unite(runs_[a].piece, runs_[b].piece);
+        pieces_.join(runs_[a].piece, runs_[b].piece);
       if (runs_[a].end < runs_[b].end)
         ++a;
       else
@@ -164,23 +159,12 @@ class RunPieces {
     }
   }
 
-  std::size_t root(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-
-  void unite(std::size_t a, std::size_t b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
   const Mask& mask_;
   const std::vector<RowExtent>& extents_;
   bool foreground_;
   int reach_;
   std::vector<Run> runs_;
-  std::vector<std::size_t> parent_;
+  DisjointSets pieces_;
   std::vector<std::size_t> row_begin_;
 };
 

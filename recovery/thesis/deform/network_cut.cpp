@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "base/disjoint_sets.h"
 #include "base/index.h"
 #include "kernel/refine/control_mesh.h"
 #include "kernel/refine/refinement.h"
@@ -46,12 +47,7 @@ KnotVector cut(const KnotVector& knots, SpanPieces pieces, bool against) {
 // Numbers the fine control points, one number for all that joins make one: the first occurrence's
 // order. Returns the number of each, patch after patch.
 std::vector<int> shared_numbers(const SurfaceNetwork& fine, const std::vector<std::size_t>& first) {
-  std::vector<std::size_t> parent(first.back());
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
-  const auto root = [&](std::size_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets shared(first.back());
 
   // A join makes one of each pair of control points along it, end against end where reversed.
   for (const Join& join : fine.joins) {
@@ -59,22 +55,12 @@ std::vector<int> shared_numbers(const SurfaceNetwork& fine, const std::vector<st
     const Patch &a = fine.patches[pa], &b = fine.patches[pb];
     const int count = knots_along(a, runs_with_v(join.a.side)).control_point_count();
     for (int t = 0; t < count; ++t) {
-      const std::size_t i = root(first[pa] + column_on_side(a, join.a.side, t));
-      const std::size_t j =
-          root(first[pb] + column_on_side(b, join.b.side, join.reversed ? count - 1 - t : t));
-      parent[std::max(i, j)] = std::min(i, j);
+      const int across = join.reversed ? count - 1 - t : t;
+      shared.join(static_cast<int>(first[pa] + column_on_side(a, join.a.side, t)),
+                  static_cast<int>(first[pb] + column_on_side(b, join.b.side, across)));
     }
   }
-
-  // The classes' numbers, in the order in which they are met first.
-  std::vector<int> number(parent.size(), -1);
-  int next = 0;
-  for (std::size_t i = 0; i < parent.size(); ++i) {
-    const std::size_t r = root(i);
-    if (number[r] < 0) number[r] = next++;
-    number[i] = number[r];
-  }
-  return number;
+  return shared.numbers();
 }
 
 }  // namespace
