@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
+#include "kernel/spline/basis.h"
 #include "kernel/spline/blossom.h"
 #include "kernel/spline/knot_algebra.h"
 
@@ -14,13 +15,6 @@ namespace angiospline {
 namespace {
 
 constexpr int kMaxOrder = KnotVector::kMaxDegree + 1;
-
-// Exact in double up to row 57.
-double binomial(int n, int k) {
-  double result = 1;
-  for (int i = 1; i <= k; ++i) result = result * (n - k + i) / i;
-  return result;
-}
 
 // Walks over all ways to deal a window of knots out to two factors, p to the first.
 class Dealer {

@@ -7,18 +7,13 @@
 #include "base/contract.h"
 #include "kernel/continuity/product.h"
 #include "kernel/refine/reshape.h"
+#include "kernel/spline/basis.h"
 #include "kernel/spline/knot_algebra.h"
 
 namespace angiospline {
 namespace {
 
 double triple(const Vec3& f, const Vec3& g, const Vec3& h) { return f.dot(g.cross(h)); }
-
-double binomial(int n, int k) {
-  double result = 1;
-  for (int i = 1; i <= k; ++i) result = result * (n - k + i) / i;
-  return result;
-}
 
 bool is_bezier(const KnotVector& knots) {
   return knots.control_point_count() == knots.order() && knots.knots().front() == knots.first() &&

@@ -4,20 +4,13 @@
 #include <cmath>
 #include <vector>
 
+#include "kernel/spline/basis.h"
 #include "kernel/spline/blossom.h"
 
 namespace angiospline {
 namespace {
 
 using Coefficients = BernsteinBox::Coefficients;
-
-std::vector<double> binomials(int n) {
-  std::vector<double> row(static_cast<std::size_t>(n) + 1, 1.0);
-  for (int k = 1; k <= n; ++k) {
-    row[static_cast<std::size_t>(k)] = row[static_cast<std::size_t>(k) - 1] * (n - k + 1) / k;
-  }
-  return row;
-}
 
 // Row j: how Bezier point j of the span comes from the order() control points alive there.
 Coefficients bezier_rows(const KnotVector& knots, int span) {
@@ -42,13 +35,11 @@ void add_square(const Coefficients& scaled, Coefficients& sum) {
 }
 
 Coefficients binomial_scale(Eigen::Index rows, Eigen::Index columns) {
-  const std::vector<double> u = binomials(static_cast<int>(rows) - 1);
-  const std::vector<double> v = binomials(static_cast<int>(columns) - 1);
+  const int p = static_cast<int>(rows) - 1;
+  const int q = static_cast<int>(columns) - 1;
   Coefficients scale(rows, columns);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    for (Eigen::Index j = 0; j < columns; ++j) {
-      scale(i, j) = u[static_cast<std::size_t>(i)] * v[static_cast<std::size_t>(j)];
-    }
+  for (int i = 0; i <= p; ++i) {
+    for (int j = 0; j <= q; ++j) scale(i, j) = binomial(p, i) * binomial(q, j);
   }
   return scale;
 }

@@ -1,15 +1,10 @@
 #include "kernel/evaluate/rational.h"
 
 #include "base/contract.h"
+#include "kernel/spline/basis.h"
 
 namespace angiospline {
 namespace {
-
-double binomial(int n, int k) {
-  double result = 1;
-  for (int i = 1; i <= k; ++i) result = result * (n - k + i) / i;
-  return result;
-}
 
 int column(int a, int b) { return (a + b) * (a + b + 1) / 2 + b; }
 

@@ -6,26 +6,13 @@
 #include <Eigen/Dense>
 
 #include "base/index.h"
+#include "kernel/spline/basis.h"
 
 namespace angiospline {
 namespace {
 
 constexpr int kDegree = 5;
 constexpr int kMostRatioDegree = 4;
-
-double binomial(int n, int k) {
-  static constexpr auto kTable = [] {
-    std::array<std::array<double, 12>, 12> t{};
-    for (std::size_t row = 0; row < 12; ++row) {
-      t[row][0] = 1;
-      for (std::size_t i = 1; i <= row; ++i) {
-        t[row][i] = t[row - 1][i - 1] + (i < row ? t[row - 1][i] : 0);
-      }
-    }
-    return t;
-  }();
-  return k < 0 || k > n ? 0.0 : kTable[index(n)][index(k)];
-}
 
 // The weight of a_i b_j in coefficient i + j of the product of Bernstein forms of degrees m and n.
 double product_weight(int m, int i, int n, int j) {
@@ -216,7 +203,8 @@ void tangent_plane_jacobian(const SmoothEdges& edges, const JunctionNet& net,
         put_point(row, scalar, edge.g[index(i)], w * c.rho[index(j)]);
         on_h[index(i)] -= w * (1 + c.rho[index(j)]);
         uses_h[index(i)] = true;
-        if (!edge.from_opening || j >= 2) put_vector(row, scalar, rho_column + j, w * p.g[index(i)]);
+        if (!edge.from_opening || j >= 2)
+          put_vector(row, scalar, rho_column + j, w * p.g[index(i)]);
       }
       for (int i = 0; i < kDegree; ++i) {
         const int j = k - i;
