@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/contract.h"
+#include "kernel/fit/tensor_fit.h"
 #include "kernel/numerics/banded.h"
 #include "kernel/numerics/quadrature.h"
 
@@ -279,18 +280,13 @@ BSplineSurface<D> interpolate_at_greville(const KnotVector& u, const KnotVector&
   const int m = u.control_point_count();
   const int n = v.control_point_count();
   EXPECTS(points.cols() == static_cast<Eigen::Index>(m) * n);
-  // Along u the right-hand side is m rows of n * D numbers; along v each row in turn.
-  Eigen::MatrixXd x = Eigen::Map<const Eigen::MatrixXd>(points.data(), D * n, m).transpose();
-  EXPECTS(solve_totally_positive(collocation_matrix(u, u.greville()), x) < 0);
-  const CompactRows Av = collocation_matrix(v, v.greville());
-  typename BSplineSurface<D>::ControlPoints net(D, points.cols());
-  Eigen::MatrixXd y(n, D * m);
-  for (int i = 0; i < m; ++i) {
-    for (int j = 0; j < n; ++j) y.block(j, D * i, 1, D) = x.block(i, D * j, 1, D);
-  }
-  EXPECTS(solve_totally_positive(Av, y) < 0);
-  for (int i = 0; i < m; ++i) net.middleCols(i * n, n) = y.middleCols(D * i, D).transpose();
-  return BSplineSurface<D>(u, v, std::move(net));
+  const auto solve_on = [](const KnotVector& knots) {
+    return [&knots](Eigen::MatrixXd x) -> Result<Eigen::MatrixXd> {
+      EXPECTS(solve_totally_positive(collocation_matrix(knots, knots.greville()), x) < 0);
+      return x;
+    };
+  };
+  return BSplineSurface<D>(u, v, *tensor_fit<D>(points, m, solve_on(u), solve_on(v)));
 }
 
 template <int D>
@@ -352,33 +348,11 @@ Result<BSplineSurface<D>> fit_surface(const KnotVector& u, const KnotVector& v,
     return fail(
         count_error(static_cast<std::size_t>(points.cols()), us.size() * vs.size(), "points"));
   }
-  const auto solve_direction = [](const char* name, const KnotVector& knots,
-                                  const std::vector<double>& parameters,
-                                  const Eigen::MatrixXd& values) -> Result<Eigen::MatrixXd> {
-    Result<Eigen::MatrixXd> x = least_squares_rows(knots, parameters, values);
-    if (x) return x;
-    Error error = x.error();
-    error.where = std::string(name) + " direction, " + error.where;
-    return fail(std::move(error));
-  };
-  const Result<Eigen::MatrixXd> along_u = solve_direction(
-      "u", u, us, Eigen::Map<const Eigen::MatrixXd>(points.data(), D * n, m).transpose());
-  if (!along_u) return fail(along_u.error());
-  const Eigen::Index rows = along_u->rows();
-  Eigen::MatrixXd values(n, D * rows);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) {
-      values.block(j, D * i, 1, D) = along_u->block(i, D * j, 1, D);
-    }
-  }
-  const Result<Eigen::MatrixXd> along_v = solve_direction("v", v, vs, values);
-  if (!along_v) return fail(along_v.error());
-  const Eigen::Index columns = along_v->rows();
-  typename BSplineSurface<D>::ControlPoints net(D, rows * columns);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    net.middleCols(i * columns, columns) = along_v->middleCols(D * i, D).transpose();
-  }
-  return BSplineSurface<D>(u, v, std::move(net));
+  auto net = tensor_fit<D>(
+      points, m, [&](const Eigen::MatrixXd& x) { return least_squares_rows(u, us, x); },
+      [&](const Eigen::MatrixXd& x) { return least_squares_rows(v, vs, x); });
+  if (!net) return fail(net.error());
+  return BSplineSurface<D>(u, v, std::move(*net));
 }
 
 CompactRows gram_matrix(const KnotVector& knots, int derivative) {

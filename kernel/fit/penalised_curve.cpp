@@ -2,72 +2,30 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "base/contract.h"
+#include "kernel/numerics/banded.h"
 #include "kernel/spline/basis.h"
 
 namespace angiospline {
 namespace {
 
-// A symmetric positive matrix of small bandwidth: row i holds columns i - width .. i.
-class BandMatrix {
- public:
-  BandMatrix(Eigen::Index size, Eigen::Index width)
-      : width_(width), rows_(Eigen::MatrixXd::Zero(width + 1, size)) {}
-
-  double& at(Eigen::Index row, Eigen::Index column) { return rows_(column - row + width_, row); }
-  double at(Eigen::Index row, Eigen::Index column) const {
-    return rows_(column - row + width_, row);
-  }
-  Eigen::Index size() const { return rows_.cols(); }
-  Eigen::Index first_column(Eigen::Index row) const {
-    return std::max<Eigen::Index>(0, row - width_);
-  }
-
-  // A = L L' in place; `ridge` is added to the diagonal.
-  void factorise(double ridge) {
-    for (Eigen::Index i = 0; i < size(); ++i) {
-      for (Eigen::Index j = first_column(i); j <= i; ++j) {
-        double sum = at(i, j) + (i == j ? ridge : 0.0);
-        for (Eigen::Index k = std::max(first_column(i), first_column(j)); k < j; ++k) {
-          sum -= at(i, k) * at(j, k);
-        }
-        at(i, j) = i == j ? std::sqrt(std::max(sum, ridge)) : sum / at(j, j);
-      }
-    }
-  }
-
-  // Solves L L' x = b in place, one right-hand side a column.
-  void solve(Eigen::MatrixXd& b) const {
-    for (Eigen::Index i = 0; i < size(); ++i) {
-      for (Eigen::Index j = first_column(i); j < i; ++j) b.row(i) -= at(i, j) * b.row(j);
-      b.row(i) /= at(i, i);
-    }
-    for (Eigen::Index i = size() - 1; i >= 0; --i) {
-      b.row(i) /= at(i, i);
-      for (Eigen::Index j = first_column(i); j < i; ++j) b.row(j) -= at(i, j) * b.row(i);
-    }
-  }
-
- private:
-  Eigen::Index width_;
-  Eigen::MatrixXd rows_;
-};
-
-// Four Gauss points integrate the square of a second derivative of degree 3 exactly.
+// Four Gauss points on [-1, 1] integrate the square of a second derivative of degree 3 exactly.
+// They are rounded to 15 digits, as they were when results were first recorded.
 constexpr std::array<double, 4> kGaussPoints{-0.861136311594053, -0.339981043584856,
                                              0.339981043584856, 0.861136311594053};
 constexpr std::array<double, 4> kGaussWeights{0.347854845137454, 0.652145154862546,
                                               0.652145154862546, 0.347854845137454};
 
-void add_product(BandMatrix& A, int first, const Eigen::RowVectorXd& b, double weight) {
-  for (Eigen::Index i = 0; i < b.size(); ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) A.at(first + i, first + j) += weight * b(i) * b(j);
+// Adds weight * b b' at the rows and columns first, first + 1, ...
+void add_product(BandedCholesky& A, int first, const Eigen::RowVectorXd& b, double weight) {
+  for (int i = 0; i < b.size(); ++i) {
+    for (int j = 0; j <= i; ++j) A.at(first + i, first + j) += weight * b(i) * b(j);
   }
 }
 
-void add_bending(BandMatrix& A, const KnotVector& knots, const std::vector<double>& bending) {
+// Adds the integrals of `bending` times products of second derivatives of the basis.
+void add_bending(BandedCholesky& A, const KnotVector& knots, const std::vector<double>& bending) {
   const std::vector<double> breaks = knots.breakpoints();
   EXPECTS(bending.size() + 1 == breaks.size());
   for (std::size_t s = 0; s + 1 < breaks.size(); ++s) {
@@ -82,9 +40,9 @@ void add_bending(BandMatrix& A, const KnotVector& knots, const std::vector<doubl
 }  // namespace
 
 Eigen::MatrixXd fit_spline(const KnotVector& knots, const SplineFitProblem& problem) {
-  const Eigen::Index n = knots.control_point_count();
-  const Eigen::Index first = problem.first.rows();
-  const Eigen::Index last = problem.last.rows();
+  const int n = knots.control_point_count();
+  const int first = static_cast<int>(problem.first.rows());
+  const int last = static_cast<int>(problem.last.rows());
   const Eigen::Index dimension = problem.values.cols();
   EXPECTS(first + last <= n);
   EXPECTS(first == 0 || problem.first.cols() == dimension);
@@ -92,7 +50,8 @@ Eigen::MatrixXd fit_spline(const KnotVector& knots, const SplineFitProblem& prob
   EXPECTS(static_cast<Eigen::Index>(problem.parameters.size()) == problem.values.rows());
   EXPECTS(problem.weights.empty() || problem.weights.size() == problem.parameters.size());
 
-  BandMatrix A(n, knots.degree());
+  // The normal equations A c = b of all control points: A = B' W B + bending, b = B' W Y.
+  BandedCholesky A(n, knots.order());
   Eigen::MatrixXd b = Eigen::MatrixXd::Zero(n, dimension);
   int span = -1;
   for (std::size_t i = 0; i < problem.parameters.size(); ++i) {
@@ -105,28 +64,31 @@ Eigen::MatrixXd fit_spline(const KnotVector& knots, const SplineFitProblem& prob
   }
   if (!problem.bending.empty()) add_bending(A, knots, problem.bending);
 
+  Eigen::MatrixXd control = Eigen::MatrixXd::Zero(n, dimension);
+  if (first > 0) control.topRows(first) = problem.first;
+  if (last > 0) control.bottomRows(last) = problem.last;
+  const int free = n - first - last;
+  if (free == 0) return control;
+
   // Held rows leave the system: their columns go to the right-hand side.
-  Eigen::MatrixXd held = Eigen::MatrixXd::Zero(n, dimension);
-  if (first > 0) held.topRows(first) = problem.first;
-  if (last > 0) held.bottomRows(last) = problem.last;
-  const Eigen::Index free = n - first - last;
-  BandMatrix reduced(free, knots.degree());
+  BandedCholesky reduced(free, knots.order());
   Eigen::MatrixXd x = b.middleRows(first, free);
   double largest = 0;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = A.first_column(i); j <= i; ++j) {
+  for (int i = 0; i < n; ++i) {
+    for (int j = std::max(0, i - knots.degree()); j <= i; ++j) {
       const bool i_free = i >= first && i < first + free;
       const bool j_free = j >= first && j < first + free;
       if (i_free && j_free) reduced.at(i - first, j - first) = A.at(i, j);
-      if (i_free && !j_free) x.row(i - first) -= A.at(i, j) * held.row(j);
-      if (!i_free && j_free) x.row(j - first) -= A.at(i, j) * held.row(i);
+      if (i_free && !j_free) x.row(i - first) -= A.at(i, j) * control.row(j);
+      if (!i_free && j_free) x.row(j - first) -= A.at(i, j) * control.row(i);
     }
     largest = std::max(largest, A.at(i, i));
   }
-  reduced.factorise(1e-12 * largest);
+
+  reduced.factor_with_ridge(1e-12 * largest);
   reduced.solve(x);
-  held.middleRows(first, free) = x;
-  return held;
+  control.middleRows(first, free) = x;
+  return control;
 }
 
 }  // namespace angiospline

@@ -26,35 +26,6 @@ void add_outer(SymmetricBand& A, int first, const Row& v, double scale) {
 
 }  // namespace
 
-bool factorise_band(SymmetricBand& A) {
-  const Eigen::Index n = A.cols();
-  const Eigen::Index p = A.rows() - 1;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    if (!(A(0, j) > 0)) return false;
-    const double pivot = std::sqrt(A(0, j));
-    const Eigen::Index below = std::min(p, n - 1 - j);
-    A(0, j) = pivot;
-    for (Eigen::Index k = 1; k <= below; ++k) A(k, j) /= pivot;
-    for (Eigen::Index a = 1; a <= below; ++a) {
-      for (Eigen::Index b = a; b <= below; ++b) A(b - a, j + a) -= A(a, j) * A(b, j);
-    }
-  }
-  return true;
-}
-
-void solve_band(const SymmetricBand& L, Eigen::MatrixXd& B) {
-  const Eigen::Index n = L.cols();
-  const Eigen::Index p = L.rows() - 1;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    B.row(j) /= L(0, j);
-    for (Eigen::Index k = 1; k <= std::min(p, n - 1 - j); ++k) B.row(j + k) -= L(k, j) * B.row(j);
-  }
-  for (Eigen::Index j = n; j-- > 0;) {
-    for (Eigen::Index k = 1; k <= std::min(p, n - 1 - j); ++k) B.row(j) -= L(k, j) * B.row(j + k);
-    B.row(j) /= L(0, j);
-  }
-}
-
 PenalisedSpline::PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd& parameters,
                                  const Eigen::MatrixXd& values, const Eigen::VectorXd& weights,
                                  int order)

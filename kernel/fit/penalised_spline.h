@@ -5,19 +5,10 @@
 
 #include <Eigen/Core>
 
+#include "kernel/numerics/banded.h"
 #include "kernel/spline/knot_vector.h"
 
 namespace angiospline {
-
-// A symmetric positive definite matrix of half bandwidth p: row k of column j holds entry (j + k,
-// j).
-using SymmetricBand = Eigen::MatrixXd;  // p + 1 rows, one column for each column of the matrix
-
-// Replaces A by its Cholesky factor L (A = L L'). False if A is not positive definite. O(n p^2).
-bool factorise_band(SymmetricBand& A);
-
-// Solves L L' X = B in place of B, one right-hand side for each column. O(n p) for each.
-void solve_band(const SymmetricBand& L, Eigen::MatrixXd& B);
 
 // The least-squares problem left for the two end values when all other coefficients are eliminated:
 // minimise e' matrix e - 2 e' right over the 2 x D end values e.

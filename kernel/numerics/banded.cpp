@@ -33,25 +33,39 @@ BandedCholesky BandedCholesky::gram(const CompactRows& A, const Eigen::VectorXd&
   return N;
 }
 
+// l_ij = (a_ij - sum over k < j of l_ik l_jk) / l_jj, and the same sum for the diagonal.
+double BandedCholesky::eliminate(int i) {
+  double* row = band_.data() + static_cast<std::ptrdiff_t>(i) * width_;
+  const int low = std::max(0, i - width_ + 1);
+  for (int j = low; j < i; ++j) {
+    const double* other = band_.data() + static_cast<std::ptrdiff_t>(j) * width_;
+    double sum = row[i - j];
+    for (int k = std::max(low, j - width_ + 1); k < j; ++k) sum -= row[i - k] * other[j - k];
+    row[i - j] = sum / other[0];
+  }
+
+  double square = row[0];
+  for (int k = low; k < i; ++k) square -= row[i - k] * row[i - k];
+  return square;
+}
+
 int BandedCholesky::factor() {
   constexpr double kRounding = 64 * std::numeric_limits<double>::epsilon();
   for (int i = 0; i < size_; ++i) {
-    double* row = band_.data() + static_cast<std::ptrdiff_t>(i) * width_;
-    const double diagonal = row[0];
-    const int low = std::max(0, i - width_ + 1);
-    for (int j = low; j <= i; ++j) {
-      const double* other = band_.data() + static_cast<std::ptrdiff_t>(j) * width_;
-      double sum = row[i - j];
-      for (int k = std::max(low, j - width_ + 1); k < j; ++k) sum -= row[i - k] * other[j - k];
-      if (j < i) {
-        row[i - j] = sum / other[0];
-      } else {
-        if (!(sum > kRounding * diagonal)) return i;
-        row[0] = std::sqrt(sum);
-      }
-    }
+    const double diagonal = at(i, i);
+    const double square = eliminate(i);
+    if (!(square > kRounding * diagonal)) return i;
+    at(i, i) = std::sqrt(square);
   }
   return -1;
+}
+
+void BandedCholesky::factor_with_ridge(double ridge) {
+  EXPECTS(ridge >= 0);
+  for (int i = 0; i < size_; ++i) {
+    at(i, i) += ridge;
+    at(i, i) = std::sqrt(std::max(eliminate(i), ridge));
+  }
 }
 
 void BandedCholesky::solve(Eigen::Ref<Eigen::MatrixXd> x) const {
@@ -94,6 +108,35 @@ void BandedCholesky::solve_blocks(double* x, int stride) const {
       double* other = block(k);
       for (int c = 0; c < stride; ++c) other[c] -= factor * y[c];
     }
+  }
+}
+
+bool factorise_band(SymmetricBand& A) {
+  const Eigen::Index n = A.cols();
+  const Eigen::Index p = A.rows() - 1;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    if (!(A(0, j) > 0)) return false;
+    const double pivot = std::sqrt(A(0, j));
+    const Eigen::Index below = std::min(p, n - 1 - j);
+    A(0, j) = pivot;
+    for (Eigen::Index k = 1; k <= below; ++k) A(k, j) /= pivot;
+    for (Eigen::Index a = 1; a <= below; ++a) {
+      for (Eigen::Index b = a; b <= below; ++b) A(b - a, j + a) -= A(a, j) * A(b, j);
+    }
+  }
+  return true;
+}
+
+void solve_band(const SymmetricBand& L, Eigen::MatrixXd& B) {
+  const Eigen::Index n = L.cols();
+  const Eigen::Index p = L.rows() - 1;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    B.row(j) /= L(0, j);
+    for (Eigen::Index k = 1; k <= std::min(p, n - 1 - j); ++k) B.row(j + k) -= L(k, j) * B.row(j);
+  }
+  for (Eigen::Index j = n; j-- > 0;) {
+    for (Eigen::Index k = 1; k <= std::min(p, n - 1 - j); ++k) B.row(j) -= L(k, j) * B.row(j + k);
+    B.row(j) /= L(0, j);
   }
 }
 

@@ -25,17 +25,38 @@ class BandedCholesky {
   // diagonal entry), or -1 when the matrix is positive definite.
   int factor();
 
-  // Overwrites the columns of `x` (right-hand sides) by the solution. Requires factor() == -1.
+  // Factors the matrix plus `ridge` on its diagonal, in place. A pivot that rounding took below the
+  // ridge is raised to it, so that what the matrix leaves undetermined stays small. Requires a
+  // positive semidefinite matrix and ridge >= 0; with none, solutions of a singular matrix are not
+  // finite.
+  void factor_with_ridge(double ridge);
+
+  // Overwrites the columns of `x` (right-hand sides) by the solution. Requires a factor.
   void solve(Eigen::Ref<Eigen::MatrixXd> x) const;
 
   // The same for right-hand sides held as size() consecutive blocks of `stride` doubles.
   void solve_blocks(double* x, int stride) const;
 
  private:
+  // Makes row i the factor's, but for the diagonal: returns the square of what belongs there.
+  double eliminate(int i);
+
   int size_;
   int width_;
   std::vector<double> band_;  // row i: (i, i), (i, i - 1), ...
 };
+
+// The lower band of a symmetric matrix of half bandwidth p as a plain array, which can be added and
+// scaled: p + 1 rows, one column for each column of the matrix; row k of column j is entry
+// (j + k, j).
+using SymmetricBand = Eigen::MatrixXd;
+
+// Replaces A by its Cholesky factor L (A = L L'). False if A is not positive definite: here a pivot
+// counts as long as it is above zero, rounding or not. O(n p^2).
+bool factorise_band(SymmetricBand& A);
+
+// Solves L L' X = B in place of B, one right-hand side for each column. O(n p) for each.
+void solve_band(const SymmetricBand& L, Eigen::MatrixXd& B);
 
 // A symmetric matrix whose band runs on round the corners, as closed splines make it: entry (i, j)
 // exists where i and j are less than `width` apart on the circle of `size` rows. Its Cholesky

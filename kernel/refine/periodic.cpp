@@ -10,6 +10,7 @@
 
 #include "base/contract.h"
 #include "kernel/fit/fit.h"
+#include "kernel/fit/tensor_fit.h"
 #include "kernel/refine/refinement.h"
 #include "kernel/refine/reshape.h"
 
@@ -281,15 +282,11 @@ Result<Eigen::MatrixXd> solve_closed(const KnotVector& knots, const std::vector<
 }
 
 // One direction of a surface: closed or clamped, as its knots say.
-Result<Eigen::MatrixXd> solve_direction(const char* name, const KnotVector& knots,
-                                        const std::vector<double>& parameters,
-                                        const Eigen::MatrixXd& values) {
-  Result<Eigen::MatrixXd> x = periodic_count(knots) ? solve_closed(knots, parameters, values)
-                                                    : least_squares_rows(knots, parameters, values);
-  if (x) return x;
-  Error error = x.error();
-  error.where = std::string(name) + " direction, " + error.where;
-  return fail(std::move(error));
+CurveSolve solve_direction(const KnotVector& knots, const std::vector<double>& parameters) {
+  return [&](const Eigen::MatrixXd& values) {
+    return periodic_count(knots) ? solve_closed(knots, parameters, values)
+                                 : least_squares_rows(knots, parameters, values);
+  };
 }
 
 tl::unexpected<Error> wrong_count(Eigen::Index got, std::size_t wanted) {
@@ -323,24 +320,9 @@ Result<BSplineSurface<D>> fit_periodic(const KnotVector& u, const KnotVector& v,
   const Eigen::Index m = static_cast<Eigen::Index>(us.size());
   const Eigen::Index n = static_cast<Eigen::Index>(vs.size());
   if (points.cols() != m * n) return wrong_count(points.cols(), us.size() * vs.size());
-  const Result<Eigen::MatrixXd> along_u = solve_direction(
-      "u", u, us, Eigen::Map<const Eigen::MatrixXd>(points.data(), D * n, m).transpose());
-  if (!along_u) return fail(along_u.error());
-  const Eigen::Index rows = along_u->rows();
-  Eigen::MatrixXd values(n, D * rows);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) {
-      values.block(j, D * i, 1, D) = along_u->block(i, D * j, 1, D);
-    }
-  }
-  const Result<Eigen::MatrixXd> along_v = solve_direction("v", v, vs, values);
-  if (!along_v) return fail(along_v.error());
-  const Eigen::Index columns = along_v->rows();
-  Eigen::Matrix<double, D, Eigen::Dynamic> distinct(D, rows * columns);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    distinct.middleCols(i * columns, columns) = along_v->middleCols(D * i, D).transpose();
-  }
-  return periodic_surface<D>(u, v, distinct);
+  const auto distinct = tensor_fit<D>(points, m, solve_direction(u, us), solve_direction(v, vs));
+  if (!distinct) return fail(distinct.error());
+  return periodic_surface<D>(u, v, *distinct);
 }
 
 #define ANGIOSPLINE_INSTANTIATE(D)                                                              \

@@ -8,7 +8,7 @@
 
 #include "base/index.h"
 #include "kernel/evaluate/curvature.h"
-#include "kernel/fit/penalised_spline.h"
+#include "kernel/numerics/banded.h"
 #include "kernel/spline/basis.h"
 
 namespace angiospline {
