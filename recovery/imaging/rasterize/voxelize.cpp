@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "base/contract.h"
+#include "base/index.h"
 
 namespace angiospline {
 namespace {
@@ -71,28 +72,23 @@ class LineCaster {
   }
 
   Image<float> fill(const ImageGrid& grid) {
-    std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
-      return std::tie(a.line, a.x, a.turn) < std::tie(b.line, b.x, b.turn);
-    });
     Image<float> share(grid, 0.0F);
     const float weight = 1.0F / static_cast<float>(rows_ * rows_);
-    std::size_t i = 0;
-    while (i < crossings_.size()) {
-      const std::int64_t line = crossings_[i].line;
-      const int j = static_cast<int>(line % lines_y_) / rows_;
-      const int k = static_cast<int>(line / lines_y_) / rows_;
-      float* row = share.voxels.data() + grid.offset({0, j, k});
-      int depth = 0;
-      double from = 0;
-      for (; i < crossings_.size() && crossings_[i].line == line; ++i) {
-        const int before = depth;
-        depth += crossings_[i].turn;
-        if (before <= 0 && depth > 0) from = crossings_[i].x;
-        if (before > 0 && depth <= 0) add_stretch(row, grid.size[0], from, crossings_[i].x, weight);
-      }
-    }
+    for_each_stretch([&](int j, int k, double from, double to) {
+      add_stretch(share.voxels.data() + grid.offset({0, j, k}), grid.size[0], from, to, weight);
+    });
     for (float& v : share.voxels) v = std::min(v, 1.0F);
     return share;
+  }
+
+  Mask centres(const ImageGrid& grid) {
+    Mask mask(grid);
+    for_each_stretch([&](int j, int k, double from, double to) {
+      const int first = std::max(0, static_cast<int>(std::ceil(from)));
+      const int last = std::min(grid.size[0] - 1, static_cast<int>(std::floor(to)));
+      for (int i = first; i <= last; ++i) mask[{i, j, k}] = 1;
+    });
+    return mask;
   }
 
  private:
@@ -105,6 +101,30 @@ class LineCaster {
     const double last = std::floor((high + 0.5) * rows_ - 0.5);
     return {static_cast<int>(std::max(first, 0.0)),
             static_cast<int>(std::min(last, static_cast<double>(count - 1)))};
+  }
+
+  // Calls f(y, z, from, to) for each stretch of a line inside the surface: where the crossings
+  // before it enter more often than they leave, so that overlaps count once.
+  template <typename F>
+  void for_each_stretch(F&& f) {
+    std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
+      return std::tie(a.line, a.x, a.turn) < std::tie(b.line, b.x, b.turn);
+    });
+
+    std::size_t i = 0;
+    while (i < crossings_.size()) {
+      const std::int64_t line = crossings_[i].line;
+      const int j = static_cast<int>(line % lines_y_) / rows_;
+      const int k = static_cast<int>(line / lines_y_) / rows_;
+      int depth = 0;
+      double from = 0;
+      for (; i < crossings_.size() && crossings_[i].line == line; ++i) {
+        const int before = depth;
+        depth += crossings_[i].turn;
+        if (before <= 0 && depth > 0) from = crossings_[i].x;
+        if (before > 0 && depth <= 0) f(j, k, from, crossings_[i].x);
+      }
+    }
   }
 
   static void add_stretch(float* row, int size, double from, double to, float weight) {
@@ -122,24 +142,28 @@ class LineCaster {
   std::vector<Crossing> crossings_;
 };
 
-}  // namespace
-
-Image<float> filled_share(const TriangleMesh& mesh, const ImageGrid& grid, int rows) {
-  EXPECTS(rows >= 1 && rows <= 16);
+// The mesh's crossings with `rows` x `rows` lines along x through each voxel.
+LineCaster cast(const TriangleMesh& mesh, const ImageGrid& grid, int rows) {
   LineCaster caster(grid, rows);
   std::vector<Vec3> points;
   for (Eigen::Index p = 0; p < mesh.points_mm.cols(); ++p) {
     points.push_back(grid.index_vox(mesh.points_mm.col(p)));
   }
+
   // A mirrored grid turns triangles round.
   const bool mirrored = grid.direction.determinant() < 0;
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-    const auto corner = [&](int k) {
-      return points[static_cast<std::size_t>(mesh.triangles(k, t))];
-    };
+    const auto corner = [&](int k) { return points[index(mesh.triangles(k, t))]; };
     caster.add({corner(0), corner(mirrored ? 2 : 1), corner(mirrored ? 1 : 2)});
   }
-  return caster.fill(grid);
+  return caster;
+}
+
+}  // namespace
+
+Image<float> filled_share(const TriangleMesh& mesh, const ImageGrid& grid, int rows) {
+  EXPECTS(rows >= 1 && rows <= 16);
+  return cast(mesh, grid, rows).fill(grid);
 }
 
 Mask voxelized(const TriangleMesh& mesh, const ImageGrid& grid) {
@@ -147,6 +171,10 @@ Mask voxelized(const TriangleMesh& mesh, const ImageGrid& grid) {
   Mask mask(grid);
   for (std::size_t i = 0; i < mask.voxels.size(); ++i) mask.voxels[i] = share.voxels[i] >= 0.5F;
   return mask;
+}
+
+Mask mask_inside(const TriangleMesh& mesh, const ImageGrid& grid) {
+  return cast(mesh, grid, 1).centres(grid);
 }
 
 }  // namespace angiospline

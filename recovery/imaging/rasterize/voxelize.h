@@ -17,4 +17,9 @@ Image<float> filled_share(const TriangleMesh& mesh, const ImageGrid& grid, int r
 // The voxels at least half filled.
 Mask voxelized(const TriangleMesh& mesh, const ImageGrid& grid);
 
+// The voxels whose centre is inside, by one line through the centres of each row; centres on the
+// surface fall to either side. Requires a closed mesh, wound outward. O(triangles + lines they
+// cover + voxels).
+Mask mask_inside(const TriangleMesh& mesh, const ImageGrid& grid);
+
 }  // namespace angiospline

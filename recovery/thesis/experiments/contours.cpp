@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "recovery/analysis/compare_masks.h"
-#include "recovery/imaging/rasterize/mask_inside.h"
+#include "recovery/thesis/experiments/outline.h"
 #include "recovery/thesis/experiments/printed_contours.h"
 #include "recovery/thesis/experiments/rules.h"
 #include "recovery/thesis/experiments/slice.h"
@@ -57,7 +57,6 @@ class Slice {
 
     // Missed are the points of either that the other does not have (7.3.2).
     const Mask& truth = artery(right).truth;
-    const Mask mask = mask_inside(fit->mesh.nodes_mm, truth.grid);
     double missed = 0;
     for (std::size_t i = 0; i < mask.voxels.size(); ++i)
       missed += (mask.voxels[i] != 0) != (truth.voxels[i] != 0);

@@ -7,7 +7,7 @@
 
 #include "modeling/build/build_model.h"
 #include "recovery/analysis/compare_masks.h"
-#include "recovery/imaging/rasterize/mask_inside.h"
+#include "recovery/imaging/rasterize/voxelize.h"
 #include "recovery/phantoms/phantom.h"
 #include "recovery/thesis/experiments/rules.h"
 #include "recovery/thesis/experiments/tables.h"

@@ -4,9 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "recovery/imaging/rasterize/mask_inside.h"
 #include "recovery/imaging/rasterize/shapes.h"
+#include "recovery/imaging/rasterize/voxelize.h"
 #include "recovery/thesis/deform/mesh.h"
+#include "recovery/thesis/experiments/outline.h"
 #include "recovery/thesis/experiments/printed_contours.h"
 #include "recovery/thesis/experiments/reproduce.h"
 #include "recovery/thesis/experiments/rules.h"
