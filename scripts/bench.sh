@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the benchmarks (build/bench) and runs them one after the other, each for at most BENCH_SECONDS
 # (default 300): all, or those named.
-#   scripts/bench.sh [NAME ...] [-- arguments of bench_kernel]
+#   scripts/bench.sh [NAME ...] [-- arguments of bench_kernel, bench_numerics]
 #   scripts/bench.sh kernel -- --benchmark_filter=reduce
 # Times are CPU times: compare rows of one run with each other. The exit code is 1 if a benchmark failed
 # or was cut off.
@@ -24,7 +24,7 @@ failed=0
 for name in "${names[@]}"; do
   echo "== $name"
   arguments=()
-  if [ "$name" = bench_kernel ]; then
+  if [ "$name" = bench_kernel ] || [ "$name" = bench_numerics ]; then
     arguments=(--benchmark_counters_tabular=true --benchmark_min_time=0.2 "$@")
   fi
   start=$SECONDS

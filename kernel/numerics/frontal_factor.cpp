@@ -19,62 +19,27 @@ constexpr double kMoreZeros = 0.3;  // share of a merged front's columns that ma
 constexpr int kTinyFront = 8;       // pivots below which a front is merged more readily
 constexpr double kMostZerosOfTiny = 0.6;
 
-// Row patterns of the strict lower triangle of the permuted matrix, column by column.
-std::vector<std::vector<int>> permuted_columns(const Eigen::SparseMatrix<double>& lower,
-                                               const std::vector<int>& place) {
-  std::vector<std::vector<int>> columns(place.size());
-  for (int c = 0; c < lower.outerSize(); ++c) {
-    for (Eigen::SparseMatrix<double>::InnerIterator it(lower, c); it; ++it) {
-      const int a = place[index(static_cast<int>(it.row()))];
-      const int b = place[index(c)];
-      if (a != b) columns[index(std::min(a, b))].push_back(std::max(a, b));
-    }
-  }
-  for (auto& rows : columns) std::sort(rows.begin(), rows.end());
-  return columns;
-}
-
-// Liu's algorithm with path compression on the rows of the lower triangle.
-std::vector<int> elimination_tree(const std::vector<std::vector<int>>& columns) {
-  const int n = static_cast<int>(columns.size());
-  std::vector<std::vector<int>> by_row(columns.size());
-  for (int c = 0; c < n; ++c) {
-    for (const int r : columns[index(c)]) by_row[index(r)].push_back(c);
-  }
-  std::vector<int> parent(columns.size(), -1);
-  std::vector<int> ancestor(columns.size(), -1);
-  for (int r = 0; r < n; ++r) {
-    for (int c : by_row[index(r)]) {
-      while (c != -1 && c < r) {
-        const int next = std::exchange(ancestor[index(c)], r);
-        if (next == -1) parent[index(c)] = r;
-        c = next;
-      }
-    }
-  }
-  return parent;
-}
-
 // The place of each node in an order in which children come right before their parents.
 std::vector<int> postorder(const std::vector<int>& parent) {
   const int n = static_cast<int>(parent.size());
-  std::vector<std::vector<int>> children(parent.size());
+  std::vector<int> child(parent.size(), -1), sibling(parent.size(), -1);  // the highest first
+  for (int k = 0; k < n; ++k) {
+    if (parent[index(k)] < 0) continue;
+    sibling[index(k)] = std::exchange(child[index(parent[index(k)])], k);
+  }
   std::vector<int> stack;
   for (int k = n - 1; k >= 0; --k) {
-    if (parent[index(k)] < 0) {
-      stack.push_back(k);
-    } else {
-      children[index(parent[index(k)])].push_back(k);
-    }
+    if (parent[index(k)] < 0) stack.push_back(k);
   }
+
+  // Parents are met first: places are given from the end.
   std::vector<int> place(parent.size());
   int next = n;
-  // Parents are met first: places are given from the end.
   while (!stack.empty()) {
     const int node = stack.back();
     stack.pop_back();
     place[index(node)] = --next;
-    for (const int child : children[index(node)]) stack.push_back(child);
+    for (int c = child[index(node)]; c >= 0; c = sibling[index(c)]) stack.push_back(c);
   }
   return place;
 }
@@ -119,104 +84,184 @@ bool eliminate(Eigen::Map<Eigen::MatrixXd> F, Eigen::Map<Eigen::VectorXd> diagon
 
 }  // namespace
 
-FrontalFactor::FrontalFactor(const Eigen::SparseMatrix<double>& lower) {
-  EXPECTS(lower.rows() == lower.cols() && lower.isCompressed());
-  find_order(lower);
-  find_fronts(lower);
-  place_entries(lower);
+// Entries of the lower triangle in the order of elimination, gathered by row or by column.
+struct FrontalFactor::Gathered {
+  std::vector<int> begin;  // of each group, and the end
+  std::vector<int> other;  // the column of an entry gathered by row, the row of one by column
+  std::vector<int> value;  // its place among the values of the matrix
+};
+
+// What elimination leaves: the first row below the diagonal of each column of L, or -1, and how
+// many there are.
+struct FrontalFactor::Columns {
+  std::vector<int> parent;
+  std::vector<int> below;
+};
+
+// `group` and `other` choose from (column, row).
+template <typename Group, typename Other>
+FrontalFactor::Gathered FrontalFactor::gather(const Eigen::SparseMatrix<double>& lower,
+                                              Group&& group, Other&& other) const {
+  const auto for_each = [&](auto&& f) {
+    for (int c = 0; c < lower.outerSize(); ++c) {
+      for (int k = lower.outerIndexPtr()[c]; k < lower.outerIndexPtr()[c + 1]; ++k) {
+        const auto [column, row] =
+            std::minmax(place_[index(lower.innerIndexPtr()[k])], place_[index(c)]);
+        f(k, column, row);
+      }
+    }
+  };
+  Gathered all;
+  all.begin.assign(place_.size() + 1, 0);
+  for_each([&](int, int column, int row) { ++all.begin[index(group(column, row)) + 1]; });
+  std::partial_sum(all.begin.begin(), all.begin.end(), all.begin.begin());
+
+  std::vector<int> next(all.begin.begin(), all.begin.end() - 1);
+  all.other.resize(index(lower.nonZeros()));
+  all.value.resize(index(lower.nonZeros()));
+  for_each([&](int k, int column, int row) {
+    const std::size_t at = index(next[index(group(column, row))]++);
+    all.other[at] = other(column, row);
+    all.value[at] = k;
+  });
+  return all;
 }
 
-void FrontalFactor::find_order(const Eigen::SparseMatrix<double>& lower) {
+FrontalFactor::FrontalFactor(const Eigen::SparseMatrix<double>& lower) {
+  EXPECTS(lower.rows() == lower.cols() && lower.isCompressed());
+  const Columns columns = find_order(lower);
+  find_fronts(columns);
+  const Gathered by_column = gather(
+      lower, [](int column, int) { return column; }, [](int, int row) { return row; });
+  find_rows(columns, by_column);
+  place_entries(by_column);
+}
+
+FrontalFactor::Columns FrontalFactor::find_order(const Eigen::SparseMatrix<double>& lower) {
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
   Eigen::AMDOrdering<int>()(lower.selfadjointView<Eigen::Lower>(), order);
   // order.indices()(k) is the row that is eliminated k-th.
-  place_.resize(index(static_cast<int>(lower.rows())));
-  for (int k = 0; k < static_cast<int>(lower.rows()); ++k) place_[index(order.indices()(k))] = k;
-  const std::vector<int> after = postorder(elimination_tree(permuted_columns(lower, place_)));
+  const int n = static_cast<int>(lower.rows());
+  place_.resize(index(n));
+  for (int k = 0; k < n; ++k) place_[index(order.indices()(k))] = k;
+
+  // Row r of L holds the columns on the ways from the entries of row r up the elimination tree,
+  // which grows on the way (Liu, "The role of elimination trees in sparse factorization", SIAM J.
+  // Matrix Anal. Appl. 11, 1990).
+  const Gathered by_row = gather(
+      lower, [](int, int row) { return row; }, [](int column, int) { return column; });
+  std::vector<int> parent(index(n), -1), below(index(n), 0), met_by(index(n), -1);
+  for (int r = 0; r < n; ++r) {
+    met_by[index(r)] = r;
+    for (int e = by_row.begin[index(r)]; e < by_row.begin[index(r) + 1]; ++e) {
+      for (int c = by_row.other[index(e)]; met_by[index(c)] != r; c = parent[index(c)]) {
+        if (parent[index(c)] < 0) parent[index(c)] = r;
+        ++below[index(c)];
+        met_by[index(c)] = r;
+      }
+    }
+  }
+
+  // Renumbering in postorder changes neither the tree nor the counts.
+  const std::vector<int> after = postorder(parent);
   for (int& p : place_) p = after[index(p)];
+  Columns columns{std::vector<int>(index(n), -1), std::vector<int>(index(n))};
+  for (int c = 0; c < n; ++c) {
+    const int p = parent[index(c)];
+    if (p >= 0) columns.parent[index(after[index(c)])] = after[index(p)];
+    columns.below[index(after[index(c)])] = below[index(c)];
+  }
+  return columns;
 }
 
-void FrontalFactor::find_fronts(const Eigen::SparseMatrix<double>& lower) {
-  std::vector<std::vector<int>> below = permuted_columns(lower, place_);
-  const int n = static_cast<int>(below.size());
-  // Patterns of L: a column hands its pattern to its parent, the first row below it.
-  for (int c = 0; c < n; ++c) {
-    auto& rows = below[index(c)];
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    if (rows.empty()) continue;
-    auto& of_parent = below[index(rows.front())];
-    std::vector<int> both;
-    both.reserve(of_parent.size() + rows.size());
-    // The parent's own list may still hold repeats: they go when its turn comes.
-    std::merge(rows.begin() + 1, rows.end(), of_parent.begin(), of_parent.end(),
-               std::back_inserter(both));
-    both.erase(std::unique(both.begin(), both.end()), both.end());
-    of_parent = std::move(both);
-  }
-  // Fronts from the left; a front joins the one before it if that hands on to it and little is
-  // padded. zeros: entries of the front that are padding.
-  std::vector<double> zeros;
-  for (int c = 0; c < n; ++c) {
-    Front front;
-    front.pivots = 1;
-    front.rows = {c};
-    front.rows.insert(front.rows.end(), below[index(c)].begin(), below[index(c)].end());
-    double padding = 0;
-    while (!fronts_.empty()) {
-      const Front& before = fronts_.back();
-      const int last = before.rows[index(before.pivots - 1)];
-      const bool hands_on = before.size() > before.pivots &&
-                            before.rows[index(before.pivots)] == front.rows.front() &&
-                            last + 1 == front.rows.front();
-      if (!hands_on) break;
+// Fronts from the left; a front joins the one before it if that hands on to it and little is
+// padded. Of the rows of a front only their number counts here: below its pivots they are those of
+// its last column.
+void FrontalFactor::find_fronts(const Columns& columns) {
+  struct Merged {
+    int pivots;
+    int size;
+    double zeros;  // entries that are padding
+  };
+  std::vector<Merged> merged;
+  for (int c = 0; c < static_cast<int>(columns.below.size()); ++c) {
+    Merged front{1, 1 + columns.below[index(c)], 0.0};
+    while (!merged.empty()) {
+      const Merged& before = merged.back();
+      const int first = c + 1 - front.pivots;
+      if (columns.parent[index(first - 1)] != first) break;
       const int pivots = before.pivots + front.pivots;
       const double added =
-          static_cast<double>(before.pivots) * (front.size() + before.pivots - before.size());
-      const double all = padding + zeros.back() + added;
-      const double area = static_cast<double>(pivots) * (before.pivots + front.size());
+          static_cast<double>(before.pivots) * (front.size + before.pivots - before.size);
+      const double all = front.zeros + before.zeros + added;
+      const double area = static_cast<double>(pivots) * (before.pivots + front.size);
       const double most = pivots <= kTinyFront ? kMostZerosOfTiny : kMoreZeros;
       if (all > most * area && added > 0) break;
-      std::vector<int> rows(before.rows.begin(), before.rows.begin() + before.pivots);
-      rows.insert(rows.end(), front.rows.begin(), front.rows.end());
-      front.rows = std::move(rows);
-      front.pivots = pivots;
-      padding = all;
-      fronts_.pop_back();
-      zeros.pop_back();
+      front = {pivots, before.pivots + front.size, all};
+      merged.pop_back();
     }
-    fronts_.push_back(std::move(front));
-    zeros.push_back(padding);
+    merged.push_back(front);
+  }
+
+  fronts_.resize(merged.size());
+  int first = 0;
+  for (std::size_t f = 0; f < merged.size(); ++f) {
+    fronts_[f].pivots = merged[f].pivots;
+    fronts_[f].rows.reserve(index(merged[f].size));
+    for (int k = 0; k < merged[f].pivots; ++k) fronts_[f].rows.push_back(first++);
   }
 }
 
-void FrontalFactor::place_entries(const Eigen::SparseMatrix<double>& lower) {
+// A front's rows below its pivots: those of its columns and those that its children hand on.
+void FrontalFactor::find_rows(const Columns& columns, const Gathered& by_column) {
   std::vector<int> front_of(place_.size());
-  for (int f = 0; f < static_cast<int>(fronts_.size()); ++f) {
-    for (int k = 0; k < fronts_[index(f)].pivots; ++k) front_of[index(fronts_[index(f)].rows[index(k)])] = f;
+  for (std::size_t f = 0; f < fronts_.size(); ++f) {
+    for (const int row : fronts_[f].rows) front_of[index(row)] = static_cast<int>(f);
   }
-  const auto row_in = [](const Front& front, int row) {
-    const auto found = std::lower_bound(front.rows.begin(), front.rows.end(), row);
-    return static_cast<int>(found - front.rows.begin());
-  };
-  for (int c = 0; c < lower.outerSize(); ++c) {
-    for (int k = lower.outerIndexPtr()[c]; k < lower.outerIndexPtr()[c + 1]; ++k) {
-      const int a = place_[index(lower.innerIndexPtr()[k])];
-      const int b = place_[index(c)];
-      Front& front = fronts_[index(front_of[index(std::min(a, b))])];
-      const std::ptrdiff_t column = row_in(front, std::min(a, b));
-      front.entries.push_back({k, column * front.size() + row_in(front, std::max(a, b))});
-    }
-  }
-  std::size_t panels = 0, pivots = 0;
+
+  std::vector<int> met_by(place_.size(), -1);
   for (int f = 0; f < static_cast<int>(fronts_.size()); ++f) {
     Front& front = fronts_[index(f)];
+    const int first = front.rows.front(), last = front.rows.back();
+    const auto meet = [&](int row) {
+      if (row > last && std::exchange(met_by[index(row)], f) != f) front.rows.push_back(row);
+    };
+    for (int e = by_column.begin[index(first)]; e < by_column.begin[index(last) + 1]; ++e) {
+      meet(by_column.other[index(e)]);
+    }
+    for (const int c : front.children) {
+      const Front& child = fronts_[index(c)];
+      std::for_each(child.rows.begin() + child.pivots, child.rows.end(), meet);
+    }
+    std::sort(front.rows.begin() + front.pivots, front.rows.end());
+
+    const int parent = columns.parent[index(last)];
+    if (parent >= 0) fronts_[index(front_of[index(parent)])].children.push_back(f);
+  }
+}
+
+void FrontalFactor::place_entries(const Gathered& by_column) {
+  std::vector<int> row_in_front(place_.size());
+  std::size_t panels = 0, pivots = 0;
+  for (Front& front : fronts_) {
     front.panel = std::exchange(panels, panels + index(front.size()) * index(front.pivots));
     front.first = std::exchange(pivots, pivots + index(front.pivots));
-    if (front.below() == 0) continue;
-    front.parent = front_of[index(front.rows[index(front.pivots)])];
-    fronts_[index(front.parent)].children.push_back(f);
-    for (int k = front.pivots; k < front.size(); ++k) {
-      front.rows_in_parent.push_back(row_in(fronts_[index(front.parent)], front.rows[index(k)]));
+    for (int i = 0; i < front.size(); ++i) row_in_front[index(front.rows[index(i)])] = i;
+
+    for (int k = 0; k < front.pivots; ++k) {
+      const std::size_t column = index(front.rows[index(k)]);
+      for (int e = by_column.begin[column]; e < by_column.begin[column + 1]; ++e) {
+        const std::ptrdiff_t row = row_in_front[index(by_column.other[index(e)])];
+        entries_.push_back({by_column.value[index(e)], k * std::ptrdiff_t{front.size()} + row});
+      }
+    }
+    front.entries_end = entries_.size();
+
+    for (const int c : front.children) {
+      Front& child = fronts_[index(c)];
+      for (int k = child.pivots; k < child.size(); ++k) {
+        child.rows_in_parent.push_back(row_in_front[index(child.rows[index(k)])]);
+      }
     }
   }
   panels_.resize(panels);
@@ -226,11 +271,14 @@ void FrontalFactor::place_entries(const Eigen::SparseMatrix<double>& lower) {
 bool FrontalFactor::factor(const Eigen::SparseMatrix<double>& lower) {
   const double* values = lower.valuePtr();
   waiting_.clear();
+  std::size_t entry = 0;
   for (const Front& front : fronts_) {
     const int size = front.size();
     work_.assign(index(size) * index(size), 0.0);
     Eigen::Map<Eigen::MatrixXd> F(work_.data(), size, size);
-    for (const Entry& e : front.entries) work_[static_cast<std::size_t>(e.place)] = values[e.value];
+    for (; entry < front.entries_end; ++entry)
+      work_[index(entries_[entry].place)] = values[entries_[entry].value];
+
     // Children were met right before, each with all of its own: theirs lie on top.
     std::size_t all = 0;
     for (const int c : front.children)
@@ -247,6 +295,7 @@ bool FrontalFactor::factor(const Eigen::SparseMatrix<double>& lower) {
       update += count * count;
     }
     waiting_.resize(waiting_.size() - all);
+
     if (!eliminate(F, {diagonal_.data() + front.first, front.pivots}, scaled_)) return false;
     const auto end = work_.begin() + static_cast<std::ptrdiff_t>(size) * front.pivots;
     std::copy(work_.begin(), end, panels_.begin() + static_cast<std::ptrdiff_t>(front.panel));
