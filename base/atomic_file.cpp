@@ -92,16 +92,21 @@ Result<void> write_atomically(const fs::path& given,
   if (fs::is_directory(status)) {
     return cannot_write(given, "a folder is in the place of the file");
   }
+
+  // Devices and pipes cannot be renamed over; links are followed to the file they name.
   if (fs::exists(status) && !fs::is_regular_file(status)) return write_through(given, write);
   const fs::path path = fs::exists(status) ? fs::canonical(given, ec) : given;
   const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
   if (!fs::is_directory(parent, ec)) {
     return cannot_write(given, "the folder does not exist", "folder " + parent.string());
   }
+
   const TemporaryFolder folder(parent);
   if (folder.path().empty()) return cannot_write(given, std::strerror(errno));
   const fs::path temporary = folder.path() / path.filename();
   if (auto done = write(temporary); !done) return done;
+
+  // The data is on the disk before the name is: a crash leaves the old file or the new one.
   const Descriptor written(temporary, O_RDONLY);
   if (!written.open()) return cannot_write(given, "nothing was written");
   if (!written.flush_to_disk()) return cannot_write(given, std::strerror(errno));

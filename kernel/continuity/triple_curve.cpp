@@ -95,10 +95,12 @@ BSplineCurve<1> triple_derose(const BSplineCurve<3>& f, const BSplineCurve<3>& g
   EXPECTS(is_bezier(f.knots()) && is_bezier(g.knots()) && is_bezier(h.knots()));
   EXPECTS(f.knots().first() == g.knots().first() && f.knots().first() == h.knots().first());
   EXPECTS(f.knots().last() == g.knots().last() && f.knots().last() == h.knots().last());
+
   const int nf = f.knots().degree();
   const int ng = g.knots().degree();
   const int nh = h.knots().degree();
   const int degree = nf + ng + nh;
+
   Eigen::Matrix<double, 1, Eigen::Dynamic> Q = Eigen::RowVectorXd::Zero(degree + 1);
   for (int j = 0; j <= nf; ++j) {
     for (int k = 0; k <= ng; ++k) {
@@ -110,6 +112,7 @@ BSplineCurve<1> triple_derose(const BSplineCurve<3>& f, const BSplineCurve<3>& g
       }
     }
   }
+
   return BSplineCurve<1>(KnotVector::bezier(degree, f.knots().first(), f.knots().last()),
                          std::move(Q));
 }
@@ -148,14 +151,18 @@ TripleValues TripleCurve::evaluate(const BSplineSurface<3>& a, const BSplineSurf
   const double factor_b = rim_b.factor();
   TripleValues result;
   result.values.resize(static_cast<Eigen::Index>(nodes_.size()));
+
   for (int node = 0; node < static_cast<int>(nodes_.size()); ++node) {
     const double t = nodes_[static_cast<std::size_t>(node)];
     const RimPoint at_a = evaluate_rim(rim_a, along_a_, t);
     const RimPoint at_b = evaluate_rim(rim_b, along_b_, parameter_on_b(t));
+
     const Vec3 by_f = at_b.cross.cross(at_a.tangent);  // d Phi / d F'
     const Vec3 by_g = at_a.tangent.cross(at_a.cross);
     const Vec3 by_h = at_a.cross.cross(at_b.cross);
     result.values(node) = at_a.cross.dot(by_f);
+
+    // H' goes by the boundary row alone, F' and G' by their row behind it as well.
     for (int k = 0; k < along_a_.order(); ++k) {
       const double N = factor_a * at_a.basis.values(0, k);
       const int j = at_a.basis.first + k;

@@ -52,6 +52,8 @@ BernsteinBox box_of(std::array<Coefficients, H> bezier, const Eigen::Matrix<doub
   const Eigen::Index columns = bezier[0].cols();
   const Coefficients own = binomial_scale(rows, columns);
   const Coefficients squared = binomial_scale(2 * rows - 1, 2 * columns - 1);
+
+  // The squared distance, over the squared weight where the spline is rational.
   BernsteinBox box;
   box.F = Coefficients::Zero(2 * rows - 1, 2 * columns - 1);
   for (std::size_t c = 0; c < D; ++c) {
@@ -62,6 +64,7 @@ BernsteinBox box_of(std::array<Coefficients, H> bezier, const Eigen::Matrix<doub
     }
     add_square(bezier[c].cwiseProduct(own), box.F);
   }
+
   box.F = box.F.cwiseQuotient(squared).eval();
   if constexpr (H > D) {
     box.W = Coefficients::Zero(2 * rows - 1, 2 * columns - 1);

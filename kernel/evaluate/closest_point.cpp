@@ -115,7 +115,10 @@ CurvePoint<D> descend(const BSplineCurve<H>& curve, const Eigen::Matrix<double, 
   double t = std::clamp(start, low, high);
   Point point = projected_point<D, H>(curve.at(t));
   double squared = (point - target).squaredNorm();
+
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    // Newton on half the squared distance: g its derivative, h its second; where that is not
+    // positive, the Gauss-Newton part takes its place.
     const Eigen::Matrix<double, D, 3> c = jet<D>(curve, t);
     const Point offset = point - target;
     const double g = c.col(1).dot(offset);
@@ -123,6 +126,8 @@ CurvePoint<D> descend(const BSplineCurve<H>& curve, const Eigen::Matrix<double, 
     const double scale = h > 0 ? h : c.col(1).squaredNorm();
     if (!(scale > 0)) break;
     double step = std::clamp(t - g / scale, low, high) - t;
+
+    // The step is halved until it comes nearer.
     bool moved = false;
     for (int halving = 0; halving < 30 && step != 0; ++halving, step *= 0.5) {
       const Point next = projected_point<D, H>(curve.at(t + step));
@@ -151,6 +156,8 @@ SurfacePoint<D> descend(const BSplineSurface<H>& surface, const Eigen::Matrix<do
   Point point = projected_point<D, H>(surface.at(uv(0), uv(1)));
   double squared = (point - target).squaredNorm();
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    // Gradient and Hessian of half the squared distance; G is its Gauss-Newton part, without the
+    // second derivatives.
     const Eigen::Matrix<double, D, 6> s = jet<D>(surface, uv(0), uv(1));
     const Point offset = point - target;
     const Eigen::Vector2d g(s.col(1).dot(offset), s.col(2).dot(offset));
@@ -162,10 +169,14 @@ SurfacePoint<D> descend(const BSplineSurface<H>& surface, const Eigen::Matrix<do
     H2(1, 1) += s.col(5).dot(offset);
     H2(0, 1) += s.col(4).dot(offset);
     H2(1, 0) = H2(0, 1);
+
+    // A parameter on the border that would leave the box does not move.
     const auto held = [&](int k) {
       return (uv(k) <= low(k) && g(k) > 0) || (uv(k) >= high(k) && g(k) < 0);
     };
     Eigen::Vector2d step = box_step(g, H2, G, held(0), held(1));
+
+    // The step is halved until it comes nearer.
     bool moved = false;
     for (int halving = 0; halving < 30; ++halving, step *= 0.5) {
       const Eigen::Vector2d next_uv = (uv + step).cwiseMax(low).cwiseMin(high);
@@ -230,6 +241,8 @@ typename Search::Best search(const Search& in, const std::vector<Candidate>& can
     const BernsteinBox& whole = stack.back();
     const double farthest =
         whole.W.size() == 0 ? whole.F.maxCoeff() : whole.F.cwiseQuotient(whole.W).maxCoeff();
+
+    // Depth first: the half with the lower parameters is looked at before the other.
     while (!stack.empty()) {
       const BernsteinBox box = std::move(stack.back());
       stack.pop_back();
@@ -240,12 +253,16 @@ typename Search::Best search(const Search& in, const std::vector<Candidate>& can
         const auto found = in.from(lowest[0], lowest[1]);
         if (found.distance < best.distance) best = found;
       }
+
+      // A box needs no more halving where nothing in it can be nearer by more than rounding, or
+      // where the distance is convex around the best point.
       const double squared = best.distance * best.distance;
       if (bound >= squared - kClose * farthest || ++boxes > kMostBoxes) {
         proven = std::min(proven, bound);
         continue;
       }
       if (in.holds(box, best) && box.is_convex(squared)) continue;
+
       auto [first, second] = box.halves();
       stack.push_back(std::move(second));
       stack.push_back(std::move(first));
@@ -299,6 +316,7 @@ SurfacePoint<D> nearest(const BSplineSurface<H>& surface,
       candidates.push_back({squared_distance_to_hull<D, H>(hull, target), k, l});
     }
   }
+
   sort_by_bound(candidates);
   return search(SurfaceSearch<D, H>{surface, target}, candidates,
                 {U.first(), V.first(), projected_point<D, H>(surface.at(U.first(), V.first())),

@@ -36,12 +36,63 @@ Error count_error(std::size_t got, std::size_t wanted, const char* what) {
                std::to_string(got), std::to_string(wanted) + " are needed"};
 }
 
-// Least squares with the first and last coefficients given: rows = samples, one column a
-// coordinate.
+// The first and last coefficients, given: one column a coordinate.
 struct HeldEnds {
   Eigen::MatrixXd first;  // one row a held control point
   Eigen::MatrixXd last;   // in order; the last row is the last control point
 };
+
+// The free block of A' W A + roughness * gram: rows and columns head .. head + size - 1.
+BandedCholesky normal_matrix(const CompactRows& A, const Eigen::VectorXd& weights,
+                             const CompactRows* gram, double roughness, int head, int size) {
+  BandedCholesky N(size, std::min(A.width(), size));
+  const auto is_free = [&](int c) { return c >= head && c < head + size; };
+  for (int r = 0; r < A.rows(); ++r) {
+    const double* a = A.row(r);
+    for (int i = 0; i < A.width(); ++i) {
+      const int ci = A.first(r) + i;
+      if (a[i] == 0 || !is_free(ci)) continue;
+      for (int j = 0; j <= i; ++j) {
+        if (is_free(A.first(r) + j)) {
+          N.at(ci - head, A.first(r) + j - head) += weights(r) * a[i] * a[j];
+        }
+      }
+    }
+  }
+  if (gram == nullptr) return N;
+
+  for (int r = head; r < head + size; ++r) {
+    for (int k = 0; k < gram->width(); ++k) {
+      const int c = gram->first(r) + k;
+      if (c <= r && c >= head && r - c < A.width()) {
+        N.at(r - head, c - head) += roughness * gram->row(r)[k];
+      }
+    }
+  }
+  return N;
+}
+
+// A' W (values - A x) - roughness * gram x: minus half the gradient of the sum that is minimised.
+Eigen::MatrixXd descent(const CompactRows& A, const Eigen::MatrixXd& values,
+                        const Eigen::VectorXd& weights, const CompactRows* gram, double roughness,
+                        const Eigen::MatrixXd& x) {
+  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(x.rows(), x.cols());
+  for (int r = 0; r < A.rows(); ++r) {
+    const double* a = A.row(r);
+    Eigen::RowVectorXd rest = values.row(r);
+    for (int k = 0; k < A.width(); ++k) rest -= a[k] * x.row(A.first(r) + k);
+    rest *= weights(r);
+    for (int k = 0; k < A.width(); ++k) gradient.row(A.first(r) + k) += a[k] * rest;
+  }
+  if (gram == nullptr) return gradient;
+
+  for (int r = 0; r < A.columns(); ++r) {
+    for (int k = 0; k < gram->width(); ++k) {
+      gradient.row(r) -= roughness * gram->row(r)[k] * x.row(gram->first(r) + k);
+    }
+  }
+  return gradient;
+}
 
 Result<Eigen::MatrixXd> least_squares(const CompactRows& A, const Eigen::MatrixXd& values,
                                       const Eigen::VectorXd& weights, const HeldEnds& held,
@@ -55,31 +106,7 @@ Result<Eigen::MatrixXd> least_squares(const CompactRows& A, const Eigen::MatrixX
   x.bottomRows(tail) = held.last;
   if (free == 0) return x;
 
-  // A full band is assembled, the free block factored.
-  BandedCholesky N(free, std::min(A.width(), free));
-  const auto is_free = [&](int c) { return c >= head && c < n - tail; };
-  for (int r = 0; r < A.rows(); ++r) {
-    const double* a = A.row(r);
-    for (int i = 0; i < A.width(); ++i) {
-      const int ci = A.first(r) + i;
-      if (a[i] == 0 || !is_free(ci)) continue;
-      for (int j = 0; j <= i; ++j) {
-        if (is_free(A.first(r) + j)) {
-          N.at(ci - head, A.first(r) + j - head) += weights(r) * a[i] * a[j];
-        }
-      }
-    }
-  }
-  if (gram != nullptr) {
-    for (int r = head; r < n - tail; ++r) {
-      for (int k = 0; k < gram->width(); ++k) {
-        const int c = gram->first(r) + k;
-        if (c <= r && c >= head && r - c < A.width()) {
-          N.at(r - head, c - head) += roughness * gram->row(r)[k];
-        }
-      }
-    }
-  }
+  BandedCholesky N = normal_matrix(A, weights, gram, roughness, head, free);
   if (const int bad = N.factor(); bad >= 0) {
     return fail({ErrorKind::kBadInput,
                  "too few points: a basis function is not determined",
@@ -87,23 +114,11 @@ Result<Eigen::MatrixXd> least_squares(const CompactRows& A, const Eigen::MatrixX
                  {},
                  "the points must satisfy the Schoenberg-Whitney conditions"});
   }
-  for (int pass = 0; pass < 2; ++pass) {  // the solution, then its correction
-    Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(n, values.cols());
-    for (int r = 0; r < A.rows(); ++r) {
-      const double* a = A.row(r);
-      Eigen::RowVectorXd rest = values.row(r);
-      for (int k = 0; k < A.width(); ++k) rest -= a[k] * x.row(A.first(r) + k);
-      rest *= weights(r);
-      for (int k = 0; k < A.width(); ++k) gradient.row(A.first(r) + k) += a[k] * rest;
-    }
-    if (gram != nullptr) {
-      for (int r = 0; r < n; ++r) {
-        for (int k = 0; k < gram->width(); ++k) {
-          gradient.row(r) -= roughness * gram->row(r)[k] * x.row(gram->first(r) + k);
-        }
-      }
-    }
-    Eigen::MatrixXd step = gradient.middleRows(head, free);
+
+  // The solution, then its correction on the residual (Bjorck, Numerical Methods for Least
+  // Squares Problems, 1996).
+  for (int pass = 0; pass < 2; ++pass) {
+    Eigen::MatrixXd step = descent(A, values, weights, gram, roughness, x).middleRows(head, free);
     N.solve(step);
     x.middleRows(head, free) += step;
   }
@@ -121,6 +136,7 @@ Result<HeldEnds> held_ends(const KnotVector& knots, const Eigen::MatrixXd& first
       (last_derivative.size() > 0 && last_position.size() == 0)) {
     return held_error("an end derivative is held without its position", "hold the position too");
   }
+
   const int p = knots.degree();
   const int n = knots.control_point_count();
   const bool clamped_first = knots.knots().front() == knots.first();
@@ -132,6 +148,8 @@ Result<HeldEnds> held_ends(const KnotVector& knots, const Eigen::MatrixXd& first
   if ((first_derivative.size() > 0 || last_derivative.size() > 0) && p < 1) {
     return held_error("an end derivative is held at degree 0", "degree must be at least 1");
   }
+
+  // An end derivative fixes the second control point: c' = p (c1 - c0) / (u_(p+1) - u_1).
   HeldEnds held{Eigen::MatrixXd(0, dimension), Eigen::MatrixXd(0, dimension)};
   if (first_position.size() > 0) {
     held.first = first_position.transpose();
@@ -152,6 +170,7 @@ Result<HeldEnds> held_ends(const KnotVector& knots, const Eigen::MatrixXd& first
       held.last = end;
     }
   }
+
   if (held.first.rows() + held.last.rows() > n) {
     return held_error("held ends overlap", "more control points than held conditions are needed");
   }
@@ -203,6 +222,7 @@ std::vector<CompactRows> collocation_matrices(const KnotVector& knots,
   std::vector<CompactRows> matrices(static_cast<std::size_t>(derivatives) + 1,
                                     CompactRows(rows, knots.control_point_count(), order));
   std::vector<double> basis(static_cast<std::size_t>(order * (derivatives + 1)));
+
   int span = -1;
   for (int r = 0; r < rows; ++r) {
     const double t = parameters[static_cast<std::size_t>(r)];
@@ -246,6 +266,7 @@ Result<BSplineCurve<D>> interpolate(const KnotVector& knots, const std::vector<d
     return fail(count_error(static_cast<std::size_t>(points.cols()), n, "points"));
   }
   if (auto error = parameter_error(knots, parameters)) return fail(*error);
+
   for (std::size_t i = 1; i < n; ++i) {
     if (!(parameters[i] > parameters[i - 1])) {
       return fail({ErrorKind::kBadInput, "parameter does not increase",
@@ -254,6 +275,7 @@ Result<BSplineCurve<D>> interpolate(const KnotVector& knots, const std::vector<d
     }
   }
   if (auto error = schoenberg_whitney_violation(knots, parameters)) return fail(*error);
+
   Eigen::MatrixXd x = points.transpose();
   const int bad = solve_totally_positive(collocation_matrix(knots, parameters), x);
   if (bad >= 0) {
@@ -301,6 +323,7 @@ Result<CurveFit<D>> fit_curve(const KnotVector& knots, const std::vector<double>
     return fail(count_error(options.weights.size(), count, "weights"));
   }
   if (auto error = parameter_error(knots, parameters)) return fail(*error);
+
   const Result<HeldEnds> held = held_ends(knots, optional_column<D>(options.first.position),
                                           optional_column<D>(options.first.derivative),
                                           optional_column<D>(options.last.position),
@@ -310,12 +333,14 @@ Result<CurveFit<D>> fit_curve(const KnotVector& knots, const std::vector<double>
   for (std::size_t i = 0; i < options.weights.size(); ++i) {
     weights(static_cast<Eigen::Index>(i)) = options.weights[i];
   }
+
   std::optional<CompactRows> gram;
   if (options.roughness > 0) gram = gram_matrix(knots, options.roughness_derivative);
   const CompactRows A = collocation_matrix(knots, parameters);
   const Result<Eigen::MatrixXd> x = least_squares(A, points.transpose(), weights, *held,
                                                   gram ? &*gram : nullptr, options.roughness);
   if (!x) return fail(x.error());
+
   CurveFit<D> fit{BSplineCurve<D>(knots, x->transpose()), 0, 0};
   const Eigen::Matrix<double, D, Eigen::Dynamic> residual =
       A.apply<D>(fit.curve.control_points()) - points;
@@ -361,6 +386,9 @@ CompactRows gram_matrix(const KnotVector& knots, int derivative) {
   const int n = knots.control_point_count();
   const int width = std::min(2 * p + 1, n);
   Eigen::MatrixXd band = Eigen::MatrixXd::Zero(2 * p + 1, n);  // column i: entries (i, i - p + k)
+
+  // Span by span with a rule that is exact for the product of two pieces (degree 2 (p -
+  // derivative)).
   if (derivative <= p) {
     const GaussRule rule = gauss_legendre(p - derivative + 1);
     std::vector<double> basis(static_cast<std::size_t>((derivative + 1) * (p + 1)));
@@ -379,6 +407,7 @@ CompactRows gram_matrix(const KnotVector& knots, int derivative) {
       }
     }
   }
+
   CompactRows gram(n, n, width);
   for (int i = 0; i < n; ++i) {
     // Entries beyond the matrix are zero, so a run of `width` that covers the rest loses nothing.

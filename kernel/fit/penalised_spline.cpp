@@ -33,6 +33,7 @@ PenalisedSpline::PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd&
   EXPECTS(order == 2 || order == 3);
   EXPECTS(parameters.size() == values.rows());
   EXPECTS(parameters.size() > order_ && knots.degree() > order_);
+
   basis_.resize(parameters.size(), knots.order());
   first_.resize(static_cast<std::size_t>(parameters.size()));
   int span = -1;
@@ -42,6 +43,7 @@ PenalisedSpline::PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd&
     first_[static_cast<std::size_t>(i)] = b.first;
     basis_.row(i) = b.values.row(0);
   }
+
   const int points = static_cast<int>(kGaussPoints.size());
   bending_.resize(span_count() * points, knots.order());
   for (int k = 0; k < span_count(); ++k) {
@@ -52,6 +54,7 @@ PenalisedSpline::PenalisedSpline(const KnotVector& knots, const Eigen::VectorXd&
       bending_.row(k * points + g) = basis_at(knots, t, order_).values.row(order_);
     }
   }
+
   set_weights(weights);
   set_stiffness(Eigen::VectorXd::Ones(span_count()));
 }
@@ -113,6 +116,7 @@ double PenalisedSpline::criterion(double strength, double least_noise) const {
   if (!factorise_band(L)) return std::numeric_limits<double>::infinity();
   Eigen::MatrixXd C = right_;
   solve_band(L, C);
+
   const double dimensions = static_cast<double>(values_.cols());
   const double samples = static_cast<double>((weights_.array() > 0).count());
   const double count = static_cast<double>(L.cols());
@@ -125,6 +129,9 @@ double PenalisedSpline::criterion(double strength, double least_noise) const {
       bending += 2 * penalty_(k, j) * C.row(j).dot(C.row(j + k));
     }
   }
+
+  // The restricted likelihood of Wood 2011 with the noise profiled out; the penalty has rank count
+  // - order.
   const double least = samples * dimensions * least_noise * least_noise;
   const double log_det = 2 * L.row(0).array().log().sum();
   return dimensions * ((samples - order_) * std::log(misfit + strength * bending + least) +
@@ -183,8 +190,11 @@ CondensedEnds PenalisedSpline::condensed_ends(double strength) const {
   SymmetricBand L = A;
   fix_ends(L, X, ends);
   solve_band(factor_of(L), X);
+
   CondensedEnds condensed;
   condensed.right.resize(2, dimensions);
+  // Rows 0 and n - 1 of A X are what is left of the equations that the fixed ends took the place
+  // of.
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(2, X.cols());  // the end rows of A times X
   for (Eigen::Index k = 0; k <= std::min(p, n - 1); ++k) {
     rows.row(0) += A(k, 0) * X.row(k);

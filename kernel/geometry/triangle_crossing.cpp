@@ -70,6 +70,9 @@ std::optional<Vec3> crossing(const Points3& points, const Triangle& ta, const Tr
     a[k] = points.col(ta[k]);
     b[k] = points.col(tb[k]);
   }
+
+  // Triangles that share a side touch there by right; those that share a corner cross where the
+  // side across from it pierces the other.
   int shared = 0;
   std::size_t at_a = 0, at_b = 0;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -85,6 +88,7 @@ std::optional<Vec3> crossing(const Points3& points, const Triangle& ta, const Tr
     if (auto x = pierce(a[(at_a + 1) % 3], a[(at_a + 2) % 3], b)) return x;
     return pierce(b[(at_b + 1) % 3], b[(at_b + 2) % 3], a);
   }
+
   for (std::size_t k = 0; k < 3; ++k) {
     if (auto x = pierce(a[k], a[(k + 1) % 3], b)) return x;
     if (auto x = pierce(b[k], b[(k + 1) % 3], a)) return x;
@@ -132,6 +136,9 @@ class Tree {
     Box all;
     for (Eigen::Index k = 0; k < points.cols(); ++k) all.add(Vec3(points.col(k)));
     const double size = std::max((all.high - all.low).maxCoeff(), 1e-300);
+
+    // In the order of a space-filling curve (Morton 1966): neighbours in the list are neighbours in
+    // space.
     std::vector<std::pair<std::uint64_t, std::uint32_t>> codes(triangles.size());
     tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
       const Vec3 middle = (points.col(triangles[t][0]) + points.col(triangles[t][1]) +
@@ -141,6 +148,7 @@ class Tree {
     });
     tbb::parallel_sort(codes.begin(), codes.end());
     for (std::size_t t = 0; t < codes.size(); ++t) order_[t] = codes[t].second;
+
     leaf_count_ = (triangles.size() + kLeaf - 1) / kLeaf;
     if (leaf_count_ > 0) {
       boxes_.resize(2 * leaf_count_ - 1);
@@ -217,6 +225,7 @@ std::vector<TriangleCrossing> crossing_triangles(const Points3& points,
                                                  const std::vector<int>& group_of,
                                                  const Progress& progress) {
   const Tree tree(points, triangles);
+
   // Fixed chunks, gathered in their order: the same result on any number of cores.
   constexpr std::size_t kChunk = 1024;
   const std::size_t chunks = (tree.leaf_count() + kChunk - 1) / kChunk;
@@ -235,6 +244,7 @@ std::vector<TriangleCrossing> crossing_triangles(const Points3& points,
       });
     }
   });
+
   std::map<std::array<int, 2>, Vec3> all;
   for (const auto& part : found) all.insert(part.begin(), part.end());
   std::vector<TriangleCrossing> result;

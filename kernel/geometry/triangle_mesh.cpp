@@ -49,12 +49,14 @@ int count_points_of_several_fans(const TriangleMesh& mesh, const std::vector<Hal
     }
     return 3 * triangle;
   };
+
   for (std::size_t i = 1; i < edges.size(); ++i) {
     if (!same_edge(edges[i - 1], edges[i])) continue;
     for (const int point : {edges[i].low, edges[i].high}) {
       fan_of_corner.join(corner(edges[i - 1].triangle, point), corner(edges[i].triangle, point));
     }
   }
+
   std::vector<int> fans(static_cast<std::size_t>(mesh.points_mm.cols()), 0);
   for (int c = 0; c < static_cast<int>(fan_of_corner.size()); ++c) {
     if (fan_of_corner.root(c) == c) ++fans[index(mesh.triangles(c % 3, c / 3))];
@@ -86,6 +88,7 @@ std::vector<int> genus_of_components(const TriangleMesh& mesh, const std::vector
       component_of_point[static_cast<std::size_t>(mesh.triangles(k, t))] = c;
     }
   }
+
   for (const int c : component_of_point) {
     if (c >= 0) ++euler[static_cast<std::size_t>(c)];
   }
@@ -149,6 +152,7 @@ MeshMeasure measure(const TriangleMesh& mesh) {
   MeshMeasure m;
   m.part_area_mm2.assign(mesh.parts.size(), 0.0);
   if (mesh.triangles.cols() == 0) return m;
+
   // Volumes are summed about a point of the mesh: far from the origin they would cancel.
   const Vec3 origin = mesh.points_mm.col(mesh.triangles(0, 0));
   m.lowest_mm = m.highest_mm = origin;
@@ -165,6 +169,7 @@ MeshMeasure measure(const TriangleMesh& mesh) {
       m.highest_mm = m.highest_mm.cwiseMax(mesh.points_mm.col(mesh.triangles(k, t)));
     }
   }
+
   const std::vector<HalfEdge> edges = sorted_half_edges(mesh);
   count_edges(edges, m);
   m.bad_points = count_points_of_several_fans(mesh, edges);
@@ -187,12 +192,14 @@ std::optional<Error> find_defect(const TriangleMesh& mesh) {
     return defect("wrong number of normals", "mesh", std::to_string(mesh.normals.cols()),
                   "one for each point, or none");
   }
+
   for (int p = 0; p < mesh.points_mm.cols(); ++p) {
     if (!mesh.points_mm.col(p).allFinite()) {
       return defect("coordinate is not finite", "point " + std::to_string(p), {},
                     "coordinates are finite");
     }
   }
+
   for (int t = 0; t < mesh.triangles.cols(); ++t) {
     const std::string where = "triangle " + std::to_string(t);
     const int part = mesh.part_of[static_cast<std::size_t>(t)];

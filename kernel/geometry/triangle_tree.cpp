@@ -41,6 +41,7 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
     const double w = ab.cross(ap).dot(n);
     if (v >= 0 && w >= 0 && v + w <= area) return a + (v * ab + w * ac) / area;
   }
+
   Vec3 best = nearest_on_segment(p, a, b);
   for (const Vec3& q : {nearest_on_segment(p, b, c), nearest_on_segment(p, c, a)}) {
     if ((q - p).squaredNorm() < (best - p).squaredNorm()) best = q;
@@ -69,6 +70,7 @@ void TriangleTree::split(int node, const Points3& centers) {
   const int first = nodes_[static_cast<std::size_t>(node)].first;
   const int last = nodes_[static_cast<std::size_t>(node)].last;
   if (last - first <= kLeafSize) return;
+
   Vec3 low = centers.col(order_[static_cast<std::size_t>(first)]);
   Vec3 high = low;
   for (int k = first; k < last; ++k) {
@@ -77,6 +79,8 @@ void TriangleTree::split(int node, const Points3& centers) {
   }
   Eigen::Index axis = 0;
   (high - low).maxCoeff(&axis);
+
+  // At the median; equal places go by number, so that the tree is the same on every machine.
   const int middle = first + (last - first) / 2;
   std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last,
                    [&](int a, int b) {
@@ -84,6 +88,7 @@ void TriangleTree::split(int node, const Points3& centers) {
                      const double cb = centers(axis, b);
                      return ca != cb ? ca < cb : a < b;
                    });
+
   nodes_[static_cast<std::size_t>(node)].left = static_cast<int>(nodes_.size());
   nodes_.push_back({Vec3::Zero(), Vec3::Zero(), first, middle, -1});
   nodes_.push_back({Vec3::Zero(), Vec3::Zero(), middle, last, -1});
@@ -121,6 +126,7 @@ NearestTrianglePoint TriangleTree::nearest(const Vec3& p, int hint) const {
   NearestTrianglePoint best;
   best.squared_distance_mm2 = std::numeric_limits<double>::infinity();
   if (hint >= 0) look_at(hint, p, best);
+
   // Halving leaves at most 32 levels, and each adds one node to the stack.
   struct Entry {
     int node;
@@ -129,6 +135,7 @@ NearestTrianglePoint TriangleTree::nearest(const Vec3& p, int hint) const {
   std::array<Entry, 64> stack;
   std::size_t depth = 0;
   stack[depth++] = {0, 0.0};
+
   while (depth > 0) {
     const Entry entry = stack[--depth];
     if (entry.squared > best.squared_distance_mm2) continue;
@@ -139,6 +146,7 @@ NearestTrianglePoint TriangleTree::nearest(const Vec3& p, int hint) const {
       }
       continue;
     }
+
     const auto entry_of = [&](int child) {
       const Node& c = nodes_[static_cast<std::size_t>(child)];
       return Entry{child, squared_distance_to_box(p, c.low, c.high)};

@@ -99,6 +99,7 @@ void BandedCholesky::solve_blocks(double* x, int stride) const {
     const double pivot = row_of(i)[0];
     for (int c = 0; c < stride; ++c) y[c] /= pivot;
   }
+
   for (int i = size_ - 1; i >= 0; --i) {
     double* y = block(i);
     const double pivot = row_of(i)[0];
@@ -193,6 +194,7 @@ int solve_totally_positive(const CompactRows& A, Eigen::Ref<Eigen::MatrixXd> b) 
   const auto at = [&](int i, int j) -> double& {
     return band[static_cast<std::size_t>(i * stride + (j - i) + w - 1)];
   };
+
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < w; ++k) {
       const int j = A.first(i) + k;
@@ -201,6 +203,9 @@ int solve_totally_positive(const CompactRows& A, Eigen::Ref<Eigen::MatrixXd> b) 
       at(i, j) = A.row(i)[k];
     }
   }
+
+  // Elimination without pivoting: minors of a totally positive matrix are not negative, so no entry
+  // grows.
   for (int k = 0; k < n; ++k) {
     const double pivot = at(k, k);
     if (!(std::abs(pivot) > std::numeric_limits<double>::min())) return k;
@@ -211,6 +216,7 @@ int solve_totally_positive(const CompactRows& A, Eigen::Ref<Eigen::MatrixXd> b) 
       b.row(i) -= factor * b.row(k);
     }
   }
+
   for (int k = n - 1; k >= 0; --k) {
     for (int j = k + 1; j < std::min(n, k + w); ++j) b.row(k) -= at(k, j) * b.row(j);
     b.row(k) /= at(k, k);

@@ -61,6 +61,7 @@ void apply_rows(const CompactRows& A, int from, int to, const double* blocks,
       int high = width;
       while (low < high && a[low] == 0) ++low;
       while (low < high && a[high - 1] == 0) --high;
+
       constexpr std::ptrdiff_t kChunk = 8;  // as much as stays in registers
       std::ptrdiff_t c = 0;
       for (; c + kChunk <= stride; c += kChunk) {

@@ -64,6 +64,8 @@ bool eliminate(Eigen::Map<Eigen::MatrixXd> F, Eigen::Map<Eigen::VectorXd> diagon
         F.col(j).tail(size - j) -= (F(j, k) * pivot) * F.col(k).tail(size - j);
       }
     }
+
+    // The rest of the front at once: F -= L D L' of the block.
     const int rest = size - end;
     if (rest == 0) continue;
     const auto L = F.block(end, first, rest, count);
@@ -309,6 +311,8 @@ bool FrontalFactor::factor(const Eigen::SparseMatrix<double>& lower) {
 Eigen::VectorXd FrontalFactor::solve(const Eigen::VectorXd& right) const {
   Eigen::VectorXd x(right.size());
   for (Eigen::Index k = 0; k < right.size(); ++k) x(place_[static_cast<std::size_t>(k)]) = right(k);
+
+  // L y = b, front by front,
   Eigen::VectorXd part(right.size());
   for (const Front& front : fronts_) {
     const Panel L = panel_of(front);
@@ -318,6 +322,8 @@ Eigen::VectorXd FrontalFactor::solve(const Eigen::VectorXd& right) const {
     part.head(count).noalias() = L.bottomRows(count) * own;
     for (int i = 0; i < count; ++i) x(front.rows[index(front.pivots + i)]) -= part(i);
   }
+
+  // then D L' x = y from the last front to the first.
   for (auto front = fronts_.rbegin(); front != fronts_.rend(); ++front) {
     const Panel L = panel_of(*front);
     auto own = x.segment(front->rows.front(), front->pivots);
@@ -327,6 +333,7 @@ Eigen::VectorXd FrontalFactor::solve(const Eigen::VectorXd& right) const {
     own.noalias() -= L.bottomRows(count).transpose() * part.head(count);
     L.topRows(front->pivots).triangularView<Eigen::UnitLower>().transpose().solveInPlace(own);
   }
+
   Eigen::VectorXd result(right.size());
   for (Eigen::Index k = 0; k < right.size(); ++k) {
     result(k) = x(place_[static_cast<std::size_t>(k)]);

@@ -9,6 +9,7 @@ KktSystem::KktSystem(int unknowns, int equations, const std::vector<Place>& hess
     : unknowns_(unknowns),
       equations_(equations),
       matrix_(unknowns + equations, unknowns + equations) {
+  // The pattern: H, J below it, and the whole diagonal.
   std::vector<Eigen::Triplet<double>> triplets;
   triplets.reserve(hessian_places.size() + jacobian_places.size() +
                    static_cast<std::size_t>(unknowns + equations));
@@ -20,6 +21,8 @@ KktSystem::KktSystem(int unknowns, int equations, const std::vector<Place>& hess
   matrix_.setFromTriplets(triplets.begin(), triplets.end());
   matrix_.makeCompressed();
   values_ = matrix_.valuePtr();
+
+  // Where each value goes is looked up once.
   const auto find = [&](int row, int column) {
     const int* begin = matrix_.innerIndexPtr() + matrix_.outerIndexPtr()[column];
     const int* end = matrix_.innerIndexPtr() + matrix_.outerIndexPtr()[column + 1];

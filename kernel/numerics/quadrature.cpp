@@ -10,6 +10,9 @@ namespace angiospline {
 GaussRule gauss_legendre(int count) {
   EXPECTS(count >= 1);
   GaussRule rule{Eigen::VectorXd(count), Eigen::VectorXd(count)};
+
+  // Newton from Tricomi's approximation to the i-th root; the polynomial by its three-term
+  // recurrence.
   for (int i = 0; i < count; ++i) {
     double x = -std::cos(std::numbers::pi * (i + 0.75) / (count + 0.5));
     double slope = 0;
@@ -26,6 +29,7 @@ GaussRule gauss_legendre(int count) {
       x -= step;
       if (std::abs(step) < 1e-16) break;
     }
+
     rule.nodes(i) = x;
     rule.weights(i) = 2 / ((1 - x * x) * slope * slope);
   }

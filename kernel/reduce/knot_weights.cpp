@@ -35,6 +35,7 @@ double weight_of_last(const double* knots, int p, int last, const double* points
     const double* block = points + static_cast<std::ptrdiff_t>(k) * stride;
     for (int c = 0; c < stride; ++c) value[static_cast<std::size_t>(c)] += v * block[c];
   }
+
   double largest = 0;
   for (int c = 0; c < stride; c += group) {
     double sum = 0;
@@ -55,9 +56,13 @@ void remove_last(std::vector<double>& knots, int p, int last, std::vector<double
   const auto block = [&](std::vector<double>& of, int k) {
     return of.data() + static_cast<std::ptrdiff_t>(k) * stride;
   };
+
   std::vector<double> result(points.begin(), points.end() - stride);
   const int count = static_cast<int>(result.size()) / stride;
   for (int k = mu + 1; k < count; ++k) std::copy_n(block(points, k + 1), stride, block(result, k));
+
+  // From the left while the old control point has the larger share, from the right for the rest:
+  // each step divides by at least one half.
   int k = mu - p + 1;
   for (; k <= mu; ++k) {
     const double a = insertion_factor(knots.data(), p, last, k);
@@ -67,12 +72,14 @@ void remove_last(std::vector<double>& knots, int p, int last, std::vector<double
     }
   }
   if (mu < count) std::copy_n(block(points, mu + 1), stride, block(result, mu));
+
   for (int l = mu; l > k; --l) {
     const double a = insertion_factor(knots.data(), p, last, l);
     for (int c = 0; c < stride; ++c) {
       block(result, l - 1)[c] = (block(points, l)[c] - a * block(result, l)[c]) / (1 - a);
     }
   }
+
   knots.erase(knots.begin() + last);
   points = std::move(result);
 }
@@ -87,10 +94,12 @@ std::vector<double> knot_weights(const KnotVector& knots, const double* points, 
   std::vector<double> value(static_cast<std::size_t>(stride));
   for (int j = 0; j < total; ++j) {
     if (!(knots[j] > knots.first() && knots[j] < knots.last())) continue;
+
     int last = j;
     while (knots[last + 1] == knots[j]) ++last;
     weights.push_back(weight_of_last(knots.knots().data(), p, last, points, stride, group, value));
     if (last == j) continue;
+
     // Each further copy is weighed once the lighter ones are gone, in a window around the knot.
     const int low = std::max(0, j - p - 2);
     const int high = std::min(total - 1, last + p + 2);

@@ -26,12 +26,14 @@ std::optional<Error> reduction_option_error(const KnotVector& knots, double tole
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
     return error("tolerance is not positive", std::to_string(tolerance), "must be above 0");
   }
+
   const int most = knots.order() / 2;
   if (held_first < 0 || held_last < 0 || held_first > most || held_last > most) {
     return error("wrong number of held derivatives",
                  std::to_string(held_first) + " and " + std::to_string(held_last),
                  "0 to half the order, " + std::to_string(most) + ", at each end");
   }
+
   const bool clamped_first = knots.knots().front() == knots.first();
   const bool clamped_last = knots.knots().back() == knots.last();
   if ((held_first > 0 && !clamped_first) || (held_last > 0 && !clamped_last)) {
@@ -48,6 +50,7 @@ Result<ReducedCurve<D>> reduce(const BSplineCurve<D>& curve, const ReductionOpti
                                           options.held_last)) {
     return fail(*error);
   }
+
   const ReductionProblem problem{.knots = curve.knots(),
                                  .points = curve.control_points().data(),
                                  .stride = D,
@@ -58,6 +61,7 @@ Result<ReducedCurve<D>> reduce(const BSplineCurve<D>& curve, const ReductionOpti
                                  .kept = options.kept,
                                  .polish = options.polish,
                                  .closed = is_periodic(curve)};
+
   DirectionResult result = reduce_direction(problem);
   const int count = result.knots.control_point_count();
   typename BSplineCurve<D>::ControlPoints points =
@@ -95,6 +99,7 @@ DirectionResult reduce_u(const BSplineSurface<D>& surface, double tolerance,
                                  .polish = options.polish,
                                  .closed = is_periodic_u(surface),
                                  .proof = proof};
+
   const int step = lines / kLines;
   if (step < 2) return reduce_direction(problem);
   const int kept = (lines - 1) / step + 1;
@@ -105,6 +110,8 @@ DirectionResult reduce_u(const BSplineSurface<D>& surface, double tolerance,
       few.col(static_cast<Eigen::Index>(i) * kept + j) = surface.control_point(i, j * step);
     }
   }
+
+  // Lines between the kept ones may be farther off: ask more of those kept until all agree.
   int trials = 0;
   for (const double caution : {0.97, 0.85, 0.6}) {
     ReductionProblem sketch = problem;
@@ -119,6 +126,7 @@ DirectionResult reduce_u(const BSplineSurface<D>& surface, double tolerance,
       return std::move(*result);
     }
   }
+
   DirectionResult result = reduce_direction(problem);
   result.trials += trials;
   return result;
@@ -162,12 +170,14 @@ ReducedSurface<D> reduce_u_first(const BSplineSurface<D>& surface, double share,
   const double left = options.tolerance - along_u.error_bound;
   const BSplineSurface<D> half = swap_uv(with_u(surface, std::move(along_u)));
   const SurfaceReductionOptions options_v = swapped(options);
+
   ReducedSurface<D> best{surface, 0.0, 0, ReductionOrder::kUFirst};
   double tolerance = left;
   for (int pass = 0; pass < 2; ++pass) {
     DirectionResult along_v = reduce_u(half, tolerance, options_v, proof);
     trials += along_v.trials;
     BSplineSurface<D> candidate = swap_uv(with_u(half, std::move(along_v)));
+
     const bool fewer = pass == 0 || candidate.v_count() < best.surface.v_count();
     if (!fewer) break;
     const double bound = surface_difference(surface, candidate, options.tolerance);
@@ -181,6 +191,7 @@ ReducedSurface<D> reduce_u_first(const BSplineSurface<D>& surface, double share,
     if (worth < 0.5 || !(bound > 0)) break;
     tolerance = std::min(options.tolerance, tolerance * options.tolerance / bound);
   }
+
   best.trials = trials;
   return best;
 }
@@ -210,6 +221,7 @@ Result<ReducedSurface<D>> reduce(const BSplineSurface<D>& surface,
     error->where += along_u ? ", u direction" : ", v direction";
     return fail(*error);
   }
+
   ReducedSurface<D> u_first = reduce_u_first(surface, options);
   ReducedSurface<D> v_first = reduce_u_first(swap_uv(surface), swapped(options));
   const int trials = u_first.trials + v_first.trials;
@@ -239,6 +251,8 @@ Result<ReducedCurve<D>> fit_to_tolerance(int degree, const std::vector<double>& 
     return fail({ErrorKind::kBadInput, "too few points", "fit to tolerance", std::to_string(count),
                  "at least the order, " + std::to_string(degree + 1) + ", are needed"});
   }
+
+  // Knots at means of p parameters (de Boor): the Schoenberg-Whitney conditions hold then.
   const std::size_t p = static_cast<std::size_t>(degree);
   std::vector<double> flat(p + 1, parameters.front());
   for (std::size_t j = 1; j + p < count; ++j) {
@@ -249,6 +263,7 @@ Result<ReducedCurve<D>> fit_to_tolerance(int degree, const std::vector<double>& 
   flat.insert(flat.end(), p + 1, parameters.back());
   const Result<KnotVector> knots = KnotVector::make(degree, std::move(flat));
   if (!knots) return fail(knots.error());
+
   const Result<BSplineCurve<D>> through = interpolate<D>(*knots, parameters, points);
   if (!through) return fail(through.error());
   ReductionOptions options;

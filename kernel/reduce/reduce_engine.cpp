@@ -159,6 +159,7 @@ Interior Reducer::equal_shares(const std::vector<double>& share, int wanted) con
   const double step = total / (wanted + 1);
   double before = 0;  // sum of the shares before `k`
   std::size_t k = 0;
+
   for (int i = 1; i <= wanted && k < share.size(); ++i) {
     const double target = step * i;
     while (k + 1 < share.size() && before + share[k] < target) before += share[k++];
@@ -234,6 +235,7 @@ std::optional<Trial> Reducer::least_by_shares(const std::vector<double>& share, 
   std::optional<Trial> least;
   std::optional<Point> before;
   bool tried_most = best_.has_value();
+
   while (high - low > resolution(high)) {
     guess = std::clamp(guess, low + 1, high - 1);
     // If nine knots of ten will not do there is nothing worth having.
@@ -248,12 +250,15 @@ std::optional<Trial> Reducer::least_by_shares(const std::vector<double>& share, 
     if (!does && most) return std::nullopt;
     (does ? high : low) = guess;
     if (does) least = std::move(trial);
+
+    // The law: error goes like count^-(p + 1), from this trial and, where there is one, the last.
     const double by_law =
         before ? (p_ + 1) * std::log((before->count + p_ + 1.0) / (now.count + p_ + 1.0)) : 0.0;
     const double seen = before ? std::log(now.error / before->error) : 0.0;
     const bool lawful = std::abs(by_law) < 0.1 || seen / by_law > 0.5;
     const double law = (guess + p_ + 1) * std::pow(now.error, 1.0 / (p_ + 1)) - (p_ + 1);
     const int next = static_cast<int>(std::ceil(std::min(law, 1.0 * interior_count())));
+
     guess = does ? std::min(next, guess - 1) : std::max(next, guess + 1);
     if (!lawful || guess <= low || guess >= high) guess = (low + high) / 2;
     before = now;
@@ -307,6 +312,8 @@ std::vector<double> Reducer::shares_of_best() const {
   std::vector<double> own =
       knot_weights(knots, best_->trial.points.data(), problem_.stride, problem_.group);
   for (double& s : own) s = std::pow(s / problem_.tolerance, 1.0 / (p_ + 1));
+
+  // The mass of each span: half of either knot at its ends.
   std::vector<double> breaks{knots.first()};
   std::vector<double> mass{0.0};
   for (std::size_t k = 0; k < own.size(); ++k) {
@@ -320,6 +327,8 @@ std::vector<double> Reducer::shares_of_best() const {
   mass.front() *= 2;  // the end spans have a knot on one side only
   mass.back() *= 2;
   breaks.push_back(knots.last());
+
+  // The original knots share it by the length of their cells.
   std::vector<double> share(interior_.size());
   std::size_t span = 0;
   for (std::size_t k = 0; k < share.size(); ++k) {
@@ -339,6 +348,7 @@ bool Reducer::improve(int fewer) {
   constexpr double kFar = 2.5;      // tolerances that even errors are not moved away from
   constexpr double kInReach = 1.1;  // tolerances that new weights may gain
   const int step = sampling_step(wanted);
+
   std::vector<double> current = best_share_;
   std::vector<double> nearest_share;
   std::optional<Trial> nearest;
@@ -347,6 +357,9 @@ bool Reducer::improve(int fewer) {
     const Interior chosen = equal_shares(current, wanted);
     if (static_cast<int>(chosen.size()) > wanted) return false;
     Trial trial = attempt(chosen, step);
+
+    // The first trial says whether moving knots can help: not where errors are even already and far
+    // too large.
     if (move == 0) {
       std::vector<double> sorted = largest_errors(trial);
       const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -355,12 +368,14 @@ bool Reducer::improve(int fewer) {
       if (!uneven && trial.error > kFar * problem_.tolerance) return false;
       if (uneven) moves = 2 * problem_.polish + 2;
     }
+
     std::vector<double> next = moved_to_error(current, trial);
     const double gain = nearest ? trial.error / nearest->error : 1.0;
     if (!nearest || gain < 1) {
       nearest = std::move(trial);
       nearest_share = std::move(current);
     }
+
     const double likely = step == 1 ? nearest->error : optimism_ * nearest->error;
     if (likely <= problem_.tolerance &&
         (nearest->interior != refused_ || refused_passes_ < kMostPasses)) {
@@ -371,6 +386,7 @@ bool Reducer::improve(int fewer) {
     if (move > 0 && hoped > kInReach * problem_.tolerance) return false;
     current = std::move(next);
   }
+
   if (!nearest || nearest->error > kInReach * problem_.tolerance ||
       !confirm(std::move(*nearest), kMostPasses)) {
     return false;
@@ -440,6 +456,7 @@ std::optional<DirectionResult> coarsened(const ReductionProblem& problem) {
   Interior all(std::upper_bound(U.begin(), U.end(), problem.knots.first()),
                std::lower_bound(U.begin(), U.end(), problem.knots.last()));
   if (all.size() <= kMany) return std::nullopt;
+
   Interior chosen;
   for (std::size_t k = 0; k < all.size(); ++k) {
     const bool multiple =
@@ -448,6 +465,7 @@ std::optional<DirectionResult> coarsened(const ReductionProblem& problem) {
                                     [&](const Knot& kept) { return kept.value == all[k]; });
     if (multiple || wanted || k % 4 == 3) chosen.push_back(all[k]);
   }
+
   if (2 * chosen.size() > all.size()) return std::nullopt;
   ReductionProblem strict = problem;
   strict.tolerance = kShare * problem.tolerance;

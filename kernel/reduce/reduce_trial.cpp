@@ -36,6 +36,9 @@ TrialSolver::TrialSolver(const ReductionProblem& problem)
     double t;
     double weight;
   };
+
+  // Samples at the Greville points, each weighted with its function's mean support: the discrete
+  // norm of Lyche & Morken 1988.
   std::vector<Node> nodes;
   for (int i = 0; i < count; ++i) {
     double t = U.greville(i);
@@ -47,10 +50,12 @@ TrialSolver::TrialSolver(const ReductionProblem& problem)
     std::stable_sort(nodes.begin(), nodes.end(),
                      [](const Node& a, const Node& b) { return a.t < b.t; });
   }
+
   for (const Node& node : nodes) {
     nodes_.push_back(node.t);
     norm_.push_back(node.weight);
   }
+
   values_.resize(nodes_.size() * index(stride_));
   collocate(U, nodes_, matrix_);
   matrix_.apply_blocks(problem.points, stride_, values_.data());
@@ -74,6 +79,7 @@ KnotVector TrialSolver::trial_knots(const Interior& interior) const {
       }
       return periodic_knots(p_, period, original.last());
     }
+
     const std::vector<double>& U = original.knots();
     std::vector<double> flat(U.begin(), std::upper_bound(U.begin(), U.end(), original.first()));
     flat.insert(flat.end(), interior.begin(), interior.end());
@@ -93,6 +99,7 @@ void TrialSolver::hold_ends(const KnotVector& knots, std::vector<double>& points
     const auto block = [&](int j) {
       return points.data() + static_cast<std::ptrdiff_t>(new_basis.first + j) * stride_;
     };
+
     std::vector<double> value(index(stride_));
     for (int r = 0; r < held; ++r) {
       std::fill(value.begin(), value.end(), 0.0);
@@ -141,6 +148,8 @@ bool TrialSolver::solve(Trial& trial, const std::vector<double>& weights) {
   trial.points.assign(index(A.columns()) * index(stride_), 0.0);
   hold_ends(trial.knots, trial.points);
   if (free <= 0) return free == 0;
+
+  // The normal equations of the free control points, sample by sample.
   BandedCholesky N(free, std::min(p_ + 1, free));
   double* right = trial.points.data() + static_cast<std::ptrdiff_t>(head) * stride_;
   std::vector<double> rest(index(stride_));
@@ -165,6 +174,7 @@ bool TrialSolver::solve(Trial& trial, const std::vector<double>& weights) {
                     right + static_cast<std::ptrdiff_t>(first) * stride_);
       continue;
     }
+
     const int low = std::max(0, -first);
     const int high = std::min(p_, free - 1 - first);
     for (int i = low; i <= high; ++i) {
@@ -174,6 +184,7 @@ bool TrialSolver::solve(Trial& trial, const std::vector<double>& weights) {
       for (int j = low; j <= i; ++j) row[i - j] += scaled * a[j];
     }
   }
+
   if (N.factor() >= 0) return false;
   N.solve_blocks(right, stride_);
   return true;
@@ -185,6 +196,7 @@ bool TrialSolver::solve_closed(Trial& trial, const std::vector<double>& weights)
   const int count = *periodic_count(trial.knots);
   const int width = std::min(p_ + 1, count);
   trial.points.assign(index(A.columns()) * index(stride_), 0.0);
+
   CyclicCholesky N(count, width);
   for (int r = 0; r < A.rows(); ++r) {
     std::array<double, KnotVector::kMaxDegree + 1> a{};  // wrapped: fewer where the circle is short
@@ -199,6 +211,7 @@ bool TrialSolver::solve_closed(Trial& trial, const std::vector<double>& weights)
       for (int j = 0; j <= i; ++j) N.add(column, (A.first(r) + j) % count, scaled * a[index(j)]);
     }
   }
+
   if (!N.factor()) return false;
   N.solve_blocks(trial.points.data(), stride_);
   for (std::size_t k = index(count) * index(stride_); k < trial.points.size(); ++k) {
@@ -214,6 +227,7 @@ Trial TrialSolver::attempt(const Interior& interior, int step, const std::vector
   const int count = static_cast<int>(nodes_.size());
   const int samples = (count + step - 2) / step + 1;  // every step-th, and the last
   work_ += samples;
+
   const bool known = matrix_knots_ && matrix_step_ == step && *matrix_knots_ == trial.knots;
   if (!known) {
     parameters_.clear();
@@ -255,6 +269,9 @@ std::optional<TrialSolver::Confirmed> TrialSolver::confirm(Trial trial, int pass
                                  stride_, problem_.group, problem_.tolerance);
       if (bound <= problem_.tolerance) return Confirmed{std::move(trial), bound};
     }
+
+    // Lawson 1961: weights follow the squared error, so that least squares goes towards least
+    // maximum.
     const double before = trial.error;
     const bool hopeless = !(before < kWithinReach * problem_.tolerance);
     if (pass == passes || hopeless) return std::nullopt;

@@ -34,6 +34,9 @@ std::vector<double> span_distances(const KnotVector& knots, const Lines& net) {
   const auto node = [&](int i) { return nodes[static_cast<std::size_t>(i)]; };
   std::vector<double> distance(static_cast<std::size_t>(n), 0.0);
   if (p < 2) return distance;  // the polygon is the curve
+
+  // On each span the curve is a mean of the control points alive there, so it is no farther from a
+  // leg of the polygon than they are from the line through it (the header has the proof).
   for (int span = p; span < n; ++span) {
     if (!(knots[span] < knots[span + 1])) continue;
     double largest = 0;
@@ -41,6 +44,7 @@ std::vector<double> span_distances(const KnotVector& knots, const Lines& net) {
       if (node(leg + 1) <= knots[span] || node(leg) >= knots[span + 1]) continue;
       const double length = node(leg + 1) - node(leg);
       if (!(length > 0)) continue;
+
       for (int line = 0; line < net.lines; ++line) {
         const double* a = net.at(leg, line);
         const double* b = net.at(leg + 1, line);
@@ -69,11 +73,13 @@ double largest(const std::vector<double>& values) {
 // for; at most four at a time, so that a far first estimate does not overshoot. The bound is larger
 // where long spans meet short ones, so a border may wander through a region span by span: `border`
 // spans on either side, those no shorter, are halved with it.
+
 std::vector<double> cuts(const KnotVector& knots, const std::vector<double>& distance,
                          double tolerance, int border) {
   const int first = knots.degree();
   const int last = knots.control_point_count() - 1;
   const auto length = [&](int span) { return knots[span + 1] - knots[span]; };
+
   std::vector<int> pieces(distance.size(), 1);
   for (int span = first; span <= last; ++span) {
     const double ratio = distance[static_cast<std::size_t>(span)] / tolerance;
@@ -85,6 +91,7 @@ std::vector<double> cuts(const KnotVector& knots, const std::vector<double>& dis
     pieces[static_cast<std::size_t>(span)] =
         std::clamp(static_cast<int>(std::ceil(0.8 * std::sqrt(ratio))), 2, 4);
   }
+
   std::vector<double> added;
   for (int span = first; span <= last; ++span) {
     const int count = pieces[static_cast<std::size_t>(span)];
@@ -217,13 +224,16 @@ Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
   if (auto error = mesh_error(curve.knots(), options, "curve")) return fail(*error);
   const bool closed = is_periodic(curve);
   RefinedCurve<D> result{curve, 0};
+
   for (int round = 0; round < kMostRounds; ++round) {
     const BSplineCurve<D>& at = result.curve;
     const std::vector<double> distance =
         span_distances(at.knots(), {at.control_points().data(), 1, D});
     result.distance = largest(distance);
+
     const std::vector<double> added =
         cuts(at.knots(), distance, options.tolerance, border_width(round));
+    // Good enough: even cuts may come to fewer control points.
     if (added.empty()) {
       const auto even = cut_evenly<BSplineCurve<D>>(
           curve.knots(), control_polygon_distance(curve) / options.tolerance,
@@ -238,6 +248,7 @@ Result<RefinedCurve<D>> refine_to_tolerance(const BSplineCurve<D>& curve,
       if (even) result = {*even, control_polygon_distance(*even)};
       return result;
     }
+
     const Eigen::Index count = at.control_points().cols() + static_cast<Eigen::Index>(added.size());
     if (count > options.most_control_points) {
       return fail(too_many(count, options.most_control_points));
@@ -261,6 +272,7 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
   const bool closed_u = is_periodic_u(surface);
   const bool closed_v = is_periodic_v(surface);
   RefinedSurface<D> result{surface, 0};
+
   for (int round = 0; round < kMostRounds; ++round) {
     const BSplineSurface<D>& at = result.surface;
     const BSplineSurface<D> swapped = swap_uv(at);
@@ -270,6 +282,7 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
         span_distances(at.v(), {swapped.control_points().data(), at.u_count(), D});
     const double worst_u = largest(along_u);
     const double worst_v = largest(along_v);
+
     result.distance = worst_u + worst_v;
     if (result.distance <= options.tolerance) {
       const auto even_v =
@@ -281,6 +294,7 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
       result.distance = control_mesh_distance(result.surface);
       return result;
     }
+
     const double half = 0.5 * options.tolerance;
     const std::vector<double> added_u =
         cuts(at.u(), along_u, std::max(half, options.tolerance - worst_v), border_width(round));
@@ -291,6 +305,7 @@ Result<RefinedSurface<D>> refine_to_tolerance(const BSplineSurface<D>& surface,
     if (count > options.most_control_points) {
       return fail(too_many(count, options.most_control_points));
     }
+
     const auto finer_u = closed_u ? insert_knots_periodic_u(at, added_u) : insert_u(at, added_u);
     if (!finer_u) return fail(finer_u.error());
     auto finer =

@@ -35,6 +35,7 @@ double largest_quartered(const KnotVector& knots, int from, int to, const double
   const Result<KnotVector> part =
       KnotVector::make(p, std::vector<double>(begin + low, begin + high + p + 2));
   if (!part) return 0;  // functions that reach no span of the domain
+
   std::vector<double> added;
   for (int k = p; k < part->control_point_count(); ++k) {
     const double a = (*part)[k];
@@ -44,11 +45,13 @@ double largest_quartered(const KnotVector& knots, int from, int to, const double
       if (t > a && t < b) added.push_back(t);
     }
   }
+
   const Result<KnotVector> fine = with_knots(*part, std::move(added));
   EXPECTS(fine.has_value());
   std::vector<double> finer(size_of(*fine, stride));
   add_refined(1, *part, *fine, blocks + static_cast<std::ptrdiff_t>(low) * stride, stride,
               finer.data());
+
   double largest = 0;
   for (int i = 0; i < fine->control_point_count(); ++i) {
     largest = std::max(
@@ -93,10 +96,12 @@ double difference_bound(const KnotVector& a_knots, const double* a, const KnotVe
     return difference_bound(a_clamped, a_points.data(), b_clamped, b_points.data(), stride, group,
                             enough);
   }
+
   const KnotVector both = merged_knots(a_knots, b_knots);
   std::vector<double> difference(size_of(both, stride));
   add_refined(1, a_knots, both, a, stride, difference.data());
   add_refined(-1, b_knots, both, b, stride, difference.data());
+
   // Where a control point is beyond `enough`, the finer ones around it count in its place.
   double bound = 0;
   const int count = both.control_point_count();

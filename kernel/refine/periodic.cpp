@@ -42,6 +42,9 @@ Result<KnotVector> periodic_knots(int degree, const std::vector<Knot>& knots, do
     }
     period.insert(period.end(), static_cast<std::size_t>(knot.multiplicity), knot.value);
   }
+
+  // Knot i for any i: the period's, moved by whole periods; the first one of the next period is
+  // `end` itself, unrounded.
   const int N = static_cast<int>(period.size());
   const double length = end - period.front();
   const auto at = [&](int i) {
@@ -49,6 +52,8 @@ Result<KnotVector> periodic_knots(int degree, const std::vector<Knot>& knots, do
     const double t = period[static_cast<std::size_t>(i - turns * N)];
     return turns == 1 && t == period.front() ? end : t + turns * length;
   };
+
+  // Flat knots begin so that the first knot of the domain is the last copy of the period's first.
   const int r = knots.front().multiplicity - 1;
   std::vector<double> flat;
   for (int i = r - degree; i <= N + degree; ++i) flat.push_back(at(i));
@@ -212,10 +217,13 @@ BSplineCurve<D> with_seam(const BSplineCurve<D>& curve, double start) {
   const double last = curve.knots().last();
   EXPECTS(start >= first && start <= last);
   if (start == first || start == last) return over(curve, start, start + (last - first));
+
   std::vector<double> added;
   if (curve.knots().multiplicity(start) == 0) added.push_back(start);
   const Result<BSplineCurve<D>> fine = insert_knots_periodic(curve, added);
   EXPECTS(fine.has_value());
+
+  // The knots from `start` on come first; those before it follow one period later.
   std::vector<Knot> before;
   std::vector<Knot> period;
   int turned = 0;  // control points whose knots move to the end
@@ -228,12 +236,14 @@ BSplineCurve<D> with_seam(const BSplineCurve<D>& curve, double start) {
       turned += knot.multiplicity;
     }
   }
+
   const int old_copies = fine->knots().multiplicity(first);
   const int new_copies = period.front().multiplicity;
   period.insert(period.end(), before.begin(), before.end());
   const Result<KnotVector> knots =
       periodic_knots(curve.knots().degree(), period, start + (last - first));
   EXPECTS(knots.has_value());
+
   const int N = *periodic_count(*knots);
   // Control point 0 goes with the knot that many places before the last copy of the start.
   const int shift = turned + new_copies - old_copies;
@@ -256,6 +266,8 @@ Result<Eigen::MatrixXd> solve_closed(const KnotVector& knots, const std::vector<
                         std::to_string(knots.last()) + "]");
     }
   }
+
+  // Columns wrap: function j of the flat knots is function j mod N of the period.
   const CompactRows flat = collocation_matrix(knots, parameters);
   std::vector<Eigen::Triplet<double>> entries;
   for (int r = 0; r < flat.rows(); ++r) {
@@ -265,6 +277,9 @@ Result<Eigen::MatrixXd> solve_closed(const KnotVector& knots, const std::vector<
   }
   Eigen::SparseMatrix<double> A(flat.rows(), N);
   A.setFromTriplets(entries.begin(), entries.end());
+
+  // Normal equations, corrected once on the residual: what squaring the condition costs comes back
+  // (Bjorck, Numerical Methods for Least Squares Problems, 1996).
   const Eigen::SparseMatrix<double> normal = A.transpose() * A;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
   const double largest = normal.diagonal().maxCoeff();
@@ -273,6 +288,7 @@ Result<Eigen::MatrixXd> solve_closed(const KnotVector& knots, const std::vector<
     return refuse("points do not determine the closed spline", std::to_string(parameters.size()),
                   "the points must satisfy the Schoenberg-Whitney conditions around the period");
   }
+
   Eigen::MatrixXd x = Eigen::MatrixXd::Zero(N, values.cols());
   for (int pass = 0; pass < 2; ++pass) {  // the solution, then its correction
     const Eigen::MatrixXd rest = values - A * x;

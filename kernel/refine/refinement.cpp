@@ -155,6 +155,7 @@ void for_each_row(const KnotVector& coarse, const KnotVector& fine, const Visit&
   const int coarse_total = static_cast<int>(coarse.knots().size());
   std::array<double, kMaxOrder> row;
   DiscreteRows discrete;
+
   // Equal values are matched in order. `q` is the last old knot at or before position i, `ahead`
   // the last one at or before position i + p.
   int q = -1;
@@ -164,6 +165,7 @@ void for_each_row(const KnotVector& coarse, const KnotVector& fine, const Visit&
   added_at.reserve(fine.knots().size() - coarse.knots().size());
   std::size_t behind = 0;  // new knots at or before position i
   int position = 0;
+
   for (int i = 0; i < rows; ++i) {
     for (; position <= i + p; ++position) {
       if (ahead + 1 < coarse_total && t[position] == coarse[ahead + 1]) {
@@ -173,6 +175,7 @@ void for_each_row(const KnotVector& coarse, const KnotVector& fine, const Visit&
         ++added;
       }
     }
+
     while (behind < added_at.size() && added_at[behind] <= i) ++behind;
     q = i - static_cast<int>(behind);
     const int nu = added - static_cast<int>(behind);

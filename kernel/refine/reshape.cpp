@@ -26,6 +26,7 @@ Differences differences(const KnotVector& knots) {
   const int p = knots.degree();
   const int n = knots.control_point_count();
   if (p == 0) return {knots, CompactRows(n, n, 1)};
+
   const std::vector<double>& U = knots.knots();
   std::vector<double> kept;
   std::vector<int> rows;  // difference of control points r and r + 1
@@ -38,6 +39,9 @@ Differences differences(const KnotVector& knots) {
   kept.insert(kept.end(), U.end() - p - 1, U.end() - 1);
   Result<KnotVector> lower = KnotVector::make(p - 1, std::move(kept));
   EXPECTS(lower.has_value());
+
+  // Derivative of a spline: p (c_(r+1) - c_r) / (u_(r+p+1) - u_(r+1)) over knots one shorter at
+  // each end (de Boor, chapter X).
   Differences result{std::move(*lower), CompactRows(static_cast<int>(rows.size()), n, 2)};
   for (int k = 0; k < result.matrix.rows(); ++k) {
     const int r = rows[static_cast<std::size_t>(k)];
@@ -99,7 +103,10 @@ CompactRows elevation_matrix(const KnotVector& knots) {
   std::array<double, kMaxOrder> row;
   for (int i = 0; i < E.rows(); ++i) {
     const int span = span_inside_support(knots, raised, i);
+
     std::array<double, kMaxOrder> sum{};
+    // The blossom of degree p + 1 is the mean of the blossoms of degree p without one argument each
+    // (Ramshaw 1989).
     for (int left_out = 0; left_out <= p; ++left_out) {
       for (int k = 0, at = 0; k <= p; ++k) {
         if (k != left_out) args[static_cast<std::size_t>(at++)] = raised[i + 1 + k];
@@ -235,6 +242,8 @@ std::vector<BSplineCurve<D>> make_closed_compatible(std::vector<BSplineCurve<D>>
       missing.insert(missing.end(), static_cast<std::size_t>(std::max(count, 0)), knot.value);
     }
   };
+
+  // The union of all knots of a period, each with the highest multiplicity.
   KnotVector common = curves.front().knots();
   for (const BSplineCurve<D>& curve : curves) {
     std::vector<double> missing;
@@ -243,6 +252,7 @@ std::vector<BSplineCurve<D>> make_closed_compatible(std::vector<BSplineCurve<D>>
     EXPECTS(both.has_value());
     common = *both;
   }
+
   for (BSplineCurve<D>& curve : curves) {
     std::vector<double> missing;
     add_missing(curve.knots(), common, missing);
@@ -264,12 +274,14 @@ std::vector<BSplineCurve<D>> make_compatible(std::vector<BSplineCurve<D>> curves
     degree = std::max(degree, curve.knots().degree());
     closed = closed && is_periodic(curve);
   }
+
   const double first = curves.front().knots().first();
   const double last = curves.front().knots().last();
   for (BSplineCurve<D>& curve : curves) {
     const int by = degree - curve.knots().degree();
     curve = over(elevate(closed ? curve : clamp(curve), by), first, last);
   }
+
   if (closed) return make_closed_compatible(std::move(curves));
   KnotVector common = curves.front().knots();
   for (const BSplineCurve<D>& curve : curves) common = merged_knots(common, curve.knots());

@@ -16,6 +16,7 @@ PreparedBasis::PreparedBasis(const KnotVector& knots) : degree_(knots.degree()) 
   EXPECTS(degree_ <= kMaxDegree);
   const int order = degree_ + 1;
   std::vector<double> derivatives(static_cast<std::size_t>(order * order));
+
   for (int span = degree_; span < knots.control_point_count(); ++span) {
     if (!(knots[span] < knots[span + 1])) continue;
     const double half = 0.5 * (knots[span + 1] - knots[span]);
@@ -23,6 +24,7 @@ PreparedBasis::PreparedBasis(const KnotVector& knots) : degree_(knots.degree()) 
     middle_.push_back(knots[span] + half);
     scale_.push_back(1 / half);
     function_.push_back(span - degree_);
+
     // Taylor: the k-th coefficient is the k-th derivative in the middle, times half^k / k!.
     basis_on_span(knots, span, middle_.back(), degree_, derivatives.data());
     double factor = 1;
@@ -33,6 +35,7 @@ PreparedBasis::PreparedBasis(const KnotVector& knots) : degree_(knots.degree()) 
       factor *= half / (k + 1);
     }
   }
+
   // Sixteen buckets a span on average, so that few contain a knot; no more than fit a small cache.
   constexpr int kBucketsASpan = 16;
   constexpr int kMostBuckets = 1 << 16;
@@ -42,6 +45,7 @@ PreparedBasis::PreparedBasis(const KnotVector& knots) : degree_(knots.degree()) 
   buckets_per_unit_ = buckets / (knots.last() - knots.first());
   last_bucket_ = buckets - 1;
   start_.push_back(std::numeric_limits<double>::infinity());
+
   int s = 0;
   for (int b = 0; b < buckets; ++b) {
     // A bucket starts no later than any parameter that is mapped to it, rounding included.
@@ -71,6 +75,7 @@ EIGEN_ALWAYS_INLINE SurfacePartials<3> contract_pairs(const double* base, Eigen:
                                                       const double* Nv, const double* Mv) {
   static_assert(PV % 2 == 1);
   std::array<Two, 9> sum{};  // point, u, v: three registers each
+
   for (int j = 0; j <= PV; j += 2) {
     std::array<Two, 3> value{};
     std::array<Two, 3> slope{};
@@ -84,6 +89,7 @@ EIGEN_ALWAYS_INLINE SurfacePartials<3> contract_pairs(const double* base, Eigen:
         slope[k] += m * points;
       }
     }
+
     const std::array<Two, 3> n{Two{Nv[j], Nv[j]}, Two{Nv[j], Nv[j + 1]}, Two{Nv[j + 1], Nv[j + 1]}};
     const std::array<Two, 3> m{Two{Mv[j], Mv[j]}, Two{Mv[j], Mv[j + 1]}, Two{Mv[j + 1], Mv[j + 1]}};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -92,6 +98,7 @@ EIGEN_ALWAYS_INLINE SurfacePartials<3> contract_pairs(const double* base, Eigen:
       sum[6 + k] += m[k] * value[k];
     }
   }
+
   const auto point = [&](std::size_t k) {
     return Eigen::Vector3d(sum[k][0] + sum[k + 1][1], sum[k][1] + sum[k + 2][0],
                            sum[k + 1][0] + sum[k + 2][1]);
@@ -112,9 +119,12 @@ EIGEN_ALWAYS_INLINE SurfacePartials<D> partials_at(const PreparedBasis& bu, cons
   bu.evaluate<PU, true>(su, u, Nu.data(), Mu.data());
   bv.evaluate<PV, true>(sv, v, Nv.data(), Mv.data());
   const double* base = net + bu.first_function(su) * row + bv.first_function(sv) * D;
+
   if constexpr (D == 3 && PV % 2 == 1) {
     return contract_pairs<PU, PV>(base, row, Nu.data(), Mu.data(), Nv.data(), Mv.data());
   }
+
+  // Along u over whole rows of the net,
   using Row = Eigen::Matrix<double, D*(PV + 1), 1>;
   Row value = Nu[0] * Eigen::Map<const Row>(base);
   Row slope = Mu[0] * Eigen::Map<const Row>(base);
@@ -123,6 +133,8 @@ EIGEN_ALWAYS_INLINE SurfacePartials<D> partials_at(const PreparedBasis& bu, cons
     value += Nu[static_cast<std::size_t>(i)] * points;
     slope += Mu[static_cast<std::size_t>(i)] * points;
   }
+
+  // then along v.
   SurfacePartials<D> result;
   for (int c = 0; c < D; ++c) {
     double point = Nv[0] * value(c);
@@ -137,6 +149,7 @@ EIGEN_ALWAYS_INLINE SurfacePartials<D> partials_at(const PreparedBasis& bu, cons
     result.u(c) = by_u;
     result.v(c) = by_v;
   }
+
   return result;
 }
 
@@ -170,6 +183,7 @@ SurfacePartials<D> partials_of_any_degree(const PreparedBasis& bu, const Prepare
   basis_of_any_degree(bu, su, u, Nu.data(), Mu.data());
   basis_of_any_degree(bv, sv, v, Nv.data(), Mv.data());
   const double* base = net + bu.first_function(su) * row + bv.first_function(sv) * D;
+
   using Point = Eigen::Matrix<double, D, 1>;
   SurfacePartials<D> result{Point::Zero(), Point::Zero(), Point::Zero()};
   for (std::size_t i = 0; i <= static_cast<std::size_t>(bu.degree()); ++i, base += row) {

@@ -25,16 +25,19 @@ Result<KnotVector> KnotVector::make(int degree, std::vector<double> knots) {
     return fail({ErrorKind::kBadInput, "degree is too high", "knot vector", std::to_string(degree),
                  "degree must be at most " + std::to_string(kMaxDegree)});
   }
+
   const std::size_t order = static_cast<std::size_t>(degree) + 1;
   if (knots.size() < 2 * order) {
     return fail({ErrorKind::kBadInput, "too few knots", "knot vector", std::to_string(knots.size()),
                  "at least 2 (degree + 1) knots are needed"});
   }
+
   // One pass without a reason to stop for knots that are sound; only others are searched for the
   // first fault. NaN fails every comparison, and finite ends bound what lies between.
   bool sound = std::isfinite(knots.front()) && std::isfinite(knots.back());
   for (std::size_t i = 1; i < knots.size(); ++i) sound &= knots[i - 1] <= knots[i];
   for (std::size_t i = order; i < knots.size(); ++i) sound &= knots[i - order] < knots[i];
+
   std::size_t run = 1;
   for (std::size_t i = 0; !sound && i < knots.size(); ++i) {
     if (!std::isfinite(knots[i])) {
@@ -50,6 +53,7 @@ Result<KnotVector> KnotVector::make(int degree, std::vector<double> knots) {
                              "multiplicity must be at most degree + 1"));
     }
   }
+
   if (!(knots[order - 1] < knots[knots.size() - order])) {
     return fail(knot_error("domain is empty", order - 1, knots[order - 1],
                            "knot(degree) must be below knot(control_point_count)"));

@@ -82,6 +82,8 @@ Result<DirectedDistance> directed(const TriangleMesh& from, const TriangleTree& 
       shares[t] = share_of(from, static_cast<Eigen::Index>(t), to, spacing);
     }
   });
+
+  // Corners as well: there the distance is often the largest, and samples lie inside triangles.
   const std::vector<char> used = corners_in_use(from);
   std::vector<double> corner(used.size(), 0.0);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, used.size(), 256), [&](const auto& range) {
@@ -95,6 +97,7 @@ Result<DirectedDistance> directed(const TriangleMesh& from, const TriangleTree& 
       corner[k] = to.nearest(p).squared_distance_mm2;
     }
   });
+
   if (stopped) return fail(cancelled("compare"));
   Share all;  // summed in the order of triangles: the same on any number of threads
   for (const Share& share : shares) {
@@ -106,11 +109,13 @@ Result<DirectedDistance> directed(const TriangleMesh& from, const TriangleTree& 
       all.worst = share.worst;
     }
   }
+
   for (std::size_t k = 0; k < corner.size(); ++k) {
     if (corner[k] <= all.squared_max) continue;
     all.squared_max = corner[k];
     all.worst = from.points_mm.col(static_cast<Eigen::Index>(k));
   }
+
   DirectedDistance distance{std::sqrt(all.squared_max), 0.0, 0.0, all.worst};
   if (all.area > 0) {
     distance.mean_mm = all.sum / all.area;
@@ -173,6 +178,7 @@ Result<Comparison> compare(const TriangleMesh& a, const TriangleMesh& b,
                    "there is something to compare"});
     }
   }
+
   const MeshMeasure ma = measure(a);
   const MeshMeasure mb = measure(b);
   Comparison result;
@@ -181,6 +187,7 @@ Result<Comparison> compare(const TriangleMesh& a, const TriangleMesh& b,
     result.spacing_mm =
         (ma.highest_mm.cwiseMax(mb.highest_mm) - ma.lowest_mm.cwiseMin(mb.lowest_mm)).norm() / 300;
   }
+
   const TriangleTree tree_a(a);
   const TriangleTree tree_b(b);
   progress.at("compare", 0.0);
@@ -190,6 +197,7 @@ Result<Comparison> compare(const TriangleMesh& a, const TriangleMesh& b,
   Result<DirectedDistance> back = directed(b, tree_a, result.spacing_mm, progress);
   if (!back) return fail(back.error());
   progress.at("compare", 1.0);
+
   result.a_to_b = *there;
   result.b_to_a = *back;
   result.max_distance_mm = std::max(there->max_mm, back->max_mm);

@@ -63,9 +63,12 @@ CenterlineOverlap centerline_overlap(const CenterlineTree& truth, const Centerli
     (out.truth_length_mm == 0 ? out.correct : out.found) = 0;
     return out;
   }
+
   const double step = step_for(truth, both_mm);
   const Samples t = sampled(truth, step), r = sampled(result, step);
   const PointIndex near_truth(t.points), near_result(r.points);
+
+  // A sample of one is found where the other comes within the radius of the true vessel.
   double found_mm = 0, correct_mm = 0, moment = 0;
   for (std::size_t k = 0; k < t.points.size(); ++k)
     if (near_result.nearest(t.points[k]).distance <= t.radii[k]) found_mm += t.lengths[k];
@@ -75,6 +78,7 @@ CenterlineOverlap centerline_overlap(const CenterlineTree& truth, const Centerli
     correct_mm += r.lengths[k];
     moment += r.lengths[k] * n.distance;
   }
+
   // Over the samples' own sums, so that all of it is exactly 1.
   const double t_mm = std::accumulate(t.lengths.begin(), t.lengths.end(), 0.0);
   const double r_mm = std::accumulate(r.lengths.begin(), r.lengths.end(), 0.0);

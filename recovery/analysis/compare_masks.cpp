@@ -25,6 +25,7 @@ Faces faces_of(const Mask& mask) {
   const ImageGrid& grid = mask.grid;
   const Vec3 s = grid.spacing_mm;
   const double areas[] = {s[1] * s[2], s[0] * s[2], s[0] * s[1]};
+
   std::size_t i = 0;
   for (int z = 0; z < grid.size[2]; ++z)
     for (int y = 0; y < grid.size[1]; ++y)
@@ -108,6 +109,7 @@ Result<MaskComparison> compare_masks(const Mask& truth, const Mask& result) {
                              truth.grid.size[2], result.grid.size[0], result.grid.size[1],
                              result.grid.size[2]),
                  "they must lie on one grid"});
+
   // Files round spacing to single precision.
   if (!truth.grid.spacing_mm.isApprox(result.grid.spacing_mm, 1e-4))
     return fail({ErrorKind::kBadInput,
@@ -116,6 +118,7 @@ Result<MaskComparison> compare_masks(const Mask& truth, const Mask& result) {
                  fmt::format("{:.6g} and {:.6g} mm along x", truth.grid.spacing_mm[0],
                              result.grid.spacing_mm[0]),
                  "they must lie on one grid"});
+
   MaskComparison c;
   for (std::size_t i = 0; i < truth.voxels.size(); ++i) {
     const bool t = truth.voxels[i] != 0, r = result.voxels[i] != 0;
@@ -125,12 +128,14 @@ Result<MaskComparison> compare_masks(const Mask& truth, const Mask& result) {
   }
   c.missed = c.truth_voxels - c.both;
   c.beyond = c.result_voxels - c.both;
+
   const auto share = [](std::size_t part, std::size_t whole) {
     return static_cast<double>(part) / static_cast<double>(whole);
   };
   if (c.truth_voxels > 0) c.missed_percent = 100 * share(c.missed + c.beyond, c.truth_voxels);
   if (c.truth_voxels + c.result_voxels > 0)
     c.dice = share(2 * c.both, c.truth_voxels + c.result_voxels);
+
   c.truth_topology = topology_numbers(truth);
   c.result_topology = topology_numbers(result);
   if (c.truth_voxels > 0 && c.result_voxels > 0)

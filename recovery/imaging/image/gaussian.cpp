@@ -6,6 +6,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "recovery/imaging/image/pixel_types.h"
+
 namespace angiospline {
 namespace {
 
@@ -187,6 +189,7 @@ Image<T> smoothed(Image<T> image, double sigma_mm) {
   EXPECTS(sigma_mm >= 0);
   if (sigma_mm == 0 || image.voxels.empty()) return image;
   const std::array<std::vector<float>, 3> kernels = kernels_of(image.grid, sigma_mm);
+
   if (std::all_of(image.voxels.begin(), image.voxels.end(), is_finite<T>)) {
     convolve(
         image, kernels, [](T v) { return static_cast<float>(v); },
@@ -196,6 +199,7 @@ Image<T> smoothed(Image<T> image, double sigma_mm) {
         });
     return image;
   }
+
   // Normalised convolution (Knutsson and Westin 1993): the share of finite voxels under the kernel
   // divides the sum over them.
   Image<float> share(image.grid);
@@ -215,59 +219,77 @@ Image<T> smoothed(Image<T> image, double sigma_mm) {
   return image;
 }
 
+namespace {
+
+// The values of a box that may reach beyond the image, where the border's goes on; 0 where they are
+// not finite. `share`, of floating-point images, is 1 where they are, else 0.
+struct FiniteBox {
+  Block values, share;
+  bool all_finite = true;
+};
+
+template <typename T>
+FiniteBox finite_box(const Image<T>& image, const Voxel& first, const Voxel& size) {
+  FiniteBox box;
+  box.values.size = box.share.size = size;
+  box.values.values.reserve(static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) *
+                            static_cast<std::size_t>(size[2]));
+  for (int z = 0; z < size[2]; ++z)
+    for (int y = 0; y < size[1]; ++y)
+      for (int x = 0; x < size[0]; ++x) {
+        const T v = image[{std::clamp(first[0] + x, 0, image.grid.size[0] - 1),
+                           std::clamp(first[1] + y, 0, image.grid.size[1] - 1),
+                           std::clamp(first[2] + z, 0, image.grid.size[2] - 1)}];
+        box.all_finite = box.all_finite && is_finite(v);
+        box.values.values.push_back(is_finite(v) ? static_cast<float>(v) : 0.0F);
+        if constexpr (std::is_floating_point_v<T>)
+          box.share.values.push_back(is_finite(v) ? 1.0F : 0.0F);
+      }
+  return box;
+}
+
+}  // namespace
+
 template <typename T>
 Image<float> smoothed_box(const Image<T>& image, const Voxel& low, const Voxel& high,
                           double sigma_mm) {
   EXPECTS(sigma_mm >= 0 && image.grid.contains(low) && image.grid.contains(high));
-  const auto kernels = kernels_of(image.grid, sigma_mm);
   ImageGrid grid = image.grid;
-  Block values, share;
-  Voxel first;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const int reach = sigma_mm > 0 ? static_cast<int>(kernels[k].size()) - 1 : 0;
-    grid.size[k] = high[k] - low[k] + 1;
-    values.size[k] = grid.size[k] + 2 * reach;
-    first[k] = low[k] - reach;
-  }
+  for (std::size_t k = 0; k < 3; ++k) grid.size[k] = high[k] - low[k] + 1;
   grid.origin_mm = image.grid.world_mm(low);
   Image<float> out(grid);
-  // The border's value goes on beyond the border.
-  const auto at = [&](int x, int y, int z) {
-    return image[{std::clamp(first[0] + x, 0, image.grid.size[0] - 1),
-                  std::clamp(first[1] + y, 0, image.grid.size[1] - 1),
-                  std::clamp(first[2] + z, 0, image.grid.size[2] - 1)}];
-  };
-  bool all_finite = true;
-  values.values.reserve(static_cast<std::size_t>(values.size[0]) *
-                        static_cast<std::size_t>(values.size[1]) *
-                        static_cast<std::size_t>(values.size[2]));
-  for (int z = 0; z < values.size[2]; ++z)
-    for (int y = 0; y < values.size[1]; ++y)
-      for (int x = 0; x < values.size[0]; ++x) {
-        const T v = at(x, y, z);
-        if (sigma_mm == 0) {
-          out[{x, y, z}] = static_cast<float>(v);
-          continue;
-        }
-        all_finite = all_finite && is_finite(v);
-        values.values.push_back(is_finite(v) ? static_cast<float>(v) : 0.0F);
-        if constexpr (std::is_floating_point_v<T>)
-          share.values.push_back(is_finite(v) ? 1.0F : 0.0F);
-      }
-  if (sigma_mm == 0) return out;
-  share.size = values.size;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    values = convolved(values, axis, kernels[axis]);
-    if (!all_finite) share = convolved(share, axis, kernels[axis]);
-  }
-  for (std::size_t i = 0; i < out.voxels.size(); ++i) {
-    if (all_finite) {
-      out.voxels[i] = values.values[i];
-      continue;
-    }
+  const auto own = [&](std::size_t i) {
     const Voxel v = grid.voxel(i);
-    const T own = image[{low[0] + v[0], low[1] + v[1], low[2] + v[2]}];
-    out.voxels[i] = is_finite(own) ? values.values[i] / share.values[i] : static_cast<float>(own);
+    return image[{low[0] + v[0], low[1] + v[1], low[2] + v[2]}];
+  };
+  if (sigma_mm == 0) {
+    for (std::size_t i = 0; i < out.voxels.size(); ++i) out.voxels[i] = static_cast<float>(own(i));
+    return out;
+  }
+
+  // Wider by the kernels' reach; each convolution takes its axis's margin away.
+  const auto kernels = kernels_of(image.grid, sigma_mm);
+  Voxel first, size;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const int reach = static_cast<int>(kernels[k].size()) - 1;
+    first[k] = low[k] - reach;
+    size[k] = grid.size[k] + 2 * reach;
+  }
+  FiniteBox box = finite_box(image, first, size);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.values = convolved(box.values, axis, kernels[axis]);
+    if (!box.all_finite) box.share = convolved(box.share, axis, kernels[axis]);
+  }
+  if (box.all_finite) {
+    out.voxels.assign(box.values.values.begin(), box.values.values.end());
+    return out;
+  }
+
+  // Normalised convolution, as above.
+  for (std::size_t i = 0; i < out.voxels.size(); ++i) {
+    const T v = own(i);
+    out.voxels[i] =
+        is_finite(v) ? box.values.values[i] / box.share.values[i] : static_cast<float>(v);
   }
   return out;
 }
@@ -285,14 +307,7 @@ AnyImage smoothed(AnyImage image, double sigma_mm) {
 #define ANGIOSPLINE_INSTANTIATE(T)              \
   template Image<T> smoothed(Image<T>, double); \
   template Image<float> smoothed_box(const Image<T>&, const Voxel&, const Voxel&, double);
-ANGIOSPLINE_INSTANTIATE(std::uint8_t)
-ANGIOSPLINE_INSTANTIATE(std::int8_t)
-ANGIOSPLINE_INSTANTIATE(std::uint16_t)
-ANGIOSPLINE_INSTANTIATE(std::int16_t)
-ANGIOSPLINE_INSTANTIATE(std::uint32_t)
-ANGIOSPLINE_INSTANTIATE(std::int32_t)
-ANGIOSPLINE_INSTANTIATE(float)
-ANGIOSPLINE_INSTANTIATE(double)
+ANGIOSPLINE_FOR_PIXEL_TYPES(ANGIOSPLINE_INSTANTIATE)
 #undef ANGIOSPLINE_INSTANTIATE
 
 }  // namespace angiospline

@@ -87,6 +87,8 @@ Image<float> project_volume(const Image<float>& density, const XrayGeometry& geo
   out.grid.size = {geometry.size[0], geometry.size[1], 1};
   out.grid.spacing_mm = Vec3(geometry.pixel_mm[0], geometry.pixel_mm[1], 1);
   out.voxels.assign(out.grid.voxel_count(), 0);
+
+  // Beer and Lambert: what a ray loses is the exponential of the density along it, by midpoints.
   const double step_mm = density.grid.spacing_mm.minCoeff() / 2;
   const Vec3 source = density.grid.index_vox(geometry.source_mm);
   tbb::parallel_for(0, geometry.size[1], [&](int row) {
@@ -95,10 +97,12 @@ Image<float> project_volume(const Image<float>& density, const XrayGeometry& geo
                          column * geometry.pixel_mm[0] * geometry.column_axis +
                          row * geometry.pixel_mm[1] * geometry.row_axis;
       const Vec3 target = density.grid.index_vox(pixel);
+
       const auto [enter, leave] = clip(source, target, density.grid.size);
       if (enter >= leave) continue;
       const double length = (pixel - geometry.source_mm).norm();
       const int samples = std::max(1, static_cast<int>((leave - enter) * length / step_mm));
+
       double sum = 0;
       for (int k = 0; k < samples; ++k) {
         const double t = enter + (leave - enter) * (k + 0.5) / samples;
@@ -108,6 +112,7 @@ Image<float> project_volume(const Image<float>& density, const XrayGeometry& geo
       out[{column, row, 0}] = static_cast<float>(1 - std::exp(-attenuation_per_mm * path_mm));
     }
   });
+
   if (snr) {
     Random random(seed);
     for (float& v : out.voxels) v += static_cast<float>(random.gaussian() / *snr);

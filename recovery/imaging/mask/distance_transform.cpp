@@ -21,6 +21,9 @@ class Envelope {
   void transform(float* value, std::size_t stride, int n, double step) {
     apexes_.clear();
     const double step2 = step * step;
+
+    // The lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012): each apex with where its
+    // parabola begins to be the lowest.
     for (int i = 0; i < n; ++i) {
       const double f = static_cast<double>(value[static_cast<std::size_t>(i) * stride]);
       if (f == static_cast<double>(kFar)) continue;
@@ -34,6 +37,7 @@ class Envelope {
       }
       apexes_.push_back({i, f, from});
     }
+
     if (apexes_.empty()) return;
     std::size_t k = 0;
     for (int i = 0; i < n; ++i) {
@@ -154,6 +158,7 @@ void ForegroundDistances::find_runs(const Mask& mask) {
   const Voxel n = grid_.size;
   const double step = grid_.spacing_mm[0];
   row_begin_.assign(static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]) + 1, 0);
+
   for (int z = 0; z < n[2]; ++z)
     for (int y = 0; y < n[1]; ++y) {
       const std::uint8_t* line = mask.voxels.data() + grid_.offset({0, y, z});
@@ -162,6 +167,7 @@ void ForegroundDistances::find_runs(const Mask& mask) {
             next_foreground(line, static_cast<std::size_t>(x), static_cast<std::size_t>(n[0])));
         const int begin = x;
         while (x < n[0] && line[x] != 0) ++x;
+
         if (x == begin) continue;
         runs_.push_back({begin, x, values_.size()});
         for (int i = begin; i < x; ++i) {
@@ -183,6 +189,7 @@ void ForegroundDistances::transform_across(int axis) {
   const int slices = axis == 1 ? n[2] : n[1];
   const auto width = static_cast<std::size_t>(n[0]);
   const double step = grid_.spacing_mm[axis];
+
   tbb::parallel_for(tbb::blocked_range<int>(0, slices), [&](const tbb::blocked_range<int>& range) {
     std::vector<float> plane(width * static_cast<std::size_t>(n[along]), 0.0F);
     Envelope envelope;
@@ -194,6 +201,8 @@ void ForegroundDistances::transform_across(int axis) {
             use(i, runs_[k], plane.data() + static_cast<std::size_t>(i) * width);
         }
       };
+
+      // Runs into the plane, columns transformed there, and back.
       for_runs([&](int, const Run& run, float* line) {
         std::copy_n(values_.data() + run.first, run.end - run.begin, line + run.begin);
       });
@@ -250,6 +259,7 @@ std::vector<double> boundary_distances_mm(const Mask& mask,
   Voxel last{};
   double last_mm =
       0.0;  // distance to background at the last place: at most one step less at the next
+
   for (const std::size_t offset : offsets) {
     const Voxel v = mask.grid.voxel(offset);
     const double moved = (mask.grid.world_mm(v) - mask.grid.world_mm(last)).norm();
@@ -257,6 +267,7 @@ std::vector<double> boundary_distances_mm(const Mask& mask,
     std::size_t i = shells.first_at(std::max(0.0, last_mm - moved - margin));
     const Shells::Entry* entry = shells.at(i);
     while (entry && !reaches_background(mask, v, entry->d)) entry = shells.at(++i);
+
     if (!entry) {  // no background at all
       result.push_back(distance_to_outside_mm(mask.grid, v, 0.5));
       last_mm = 0.0;

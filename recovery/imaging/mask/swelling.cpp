@@ -68,6 +68,7 @@ std::optional<SwellingParts> find_swelling(const Mask& mask, Mask before, double
   const std::vector<std::size_t> offsets = foreground_offsets(mask);
   SwellingParts parts;
   Swelling& s = parts.swelling;
+
   std::vector<std::size_t> vessel, core;
   for (const std::size_t at : offsets) {
     const bool is_vessel = before.voxels[at] != 0;
@@ -76,14 +77,17 @@ std::optional<SwellingParts> find_swelling(const Mask& mask, Mask before, double
     before.voxels[at] = is_vessel ? kVessel : 0;
     if (is_vessel) vessel.push_back(at);
   }
+
   if (vessel.empty() || s.beyond_depth_mm < times * s.vessel_depth_mm) return std::nullopt;
   for (const std::size_t at : offsets)
     if (before.voxels[at] == 0 && depth_mm.at_mm(at) >= times * s.vessel_depth_mm) {
       before.voxels[at] = kSwelling;
       core.push_back(at);
     }
+
   spread(mask, before, std::move(vessel), std::move(core));
   s.neck = neck_of(before, offsets);
+
   parts.vessel = mask;
   for (const std::size_t at : offsets)
     if (before.voxels[at] == kSwelling) {

@@ -41,6 +41,7 @@ std::int64_t euler_characteristic(const Mask& mask, const std::vector<RowExtent>
   const Voxel n = mask.grid.size;
   const std::array<std::int8_t, 256> parts = window_parts(connectivity);
   const std::vector<std::uint8_t> outside(static_cast<std::size_t>(n[0]), 0);
+
   const auto sum_windows = [&](int y, int z) {
     std::array<const std::uint8_t*, 4> r;
     int begin = n[0], end = 0;
@@ -56,6 +57,8 @@ std::int64_t euler_characteristic(const Mask& mask, const std::vector<RowExtent>
       begin = std::min(begin, e.begin);
       end = std::max(end, e.end);
     }
+
+    // A window goes on by one voxel: its high half becomes its low one.
     std::int64_t sum = 0;
     unsigned w = 0;
     for (int x = begin; x <= end && end > 0; ++x) {
@@ -66,6 +69,7 @@ std::int64_t euler_characteristic(const Mask& mask, const std::vector<RowExtent>
     }
     return sum;
   };
+
   return tbb::parallel_reduce(
       tbb::blocked_range<int>(0, n[2] + 1), std::int64_t{0},
       [&](const tbb::blocked_range<int>& range, std::int64_t sum) {
@@ -136,6 +140,7 @@ class RunPieces {
       }
       if (!foreground_ && extent.end < n[0]) runs_.push_back({extent.end, n[0], 0});
     }
+
     row_begin_[row_index(y, z) + 1] = runs_.size();
   }
 

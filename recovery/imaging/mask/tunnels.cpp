@@ -115,6 +115,7 @@ std::int64_t euler_gain(const Mask& mask, const std::vector<std::size_t>& group)
     for (std::size_t k = 0; k < 3; ++k)
       low[k] = std::min(low[k], v[k]), high[k] = std::max(high[k], v[k]);
   }
+
   Mask box;
   for (std::size_t k = 0; k < 3; ++k) {
     low[k] = std::max(0, low[k] - 1);
@@ -125,6 +126,7 @@ std::int64_t euler_gain(const Mask& mask, const std::vector<std::size_t>& group)
   for (int z = low[2]; z <= high[2]; ++z)
     for (int y = low[1]; y <= high[1]; ++y)
       for (int x = low[0]; x <= high[0]; ++x) box.voxels.push_back(mask[{x, y, z}] != 0 ? 1 : 0);
+
   const std::int64_t before = topology_numbers(box).euler;
   for (const std::size_t o : group) {
     const Voxel v = mask.grid.voxel(o);
@@ -149,6 +151,9 @@ Result<ClosedTunnels> close_tunnels(Mask mask, const TunnelOptions& options,
   out.mask = std::move(mask);
   if (loops == 0 || loops > kMostTunnels) return out;
   for (std::uint8_t& v : out.mask.voxels) v = v != 0 ? kForeground : kBackground;
+
+  // Wider and wider closings; what fills a loop stays filled if it is narrow, or deep for its
+  // width.
   const double edge_mm = std::cbrt(out.mask.grid.spacing_mm.prod());
   for (double width = 1; width <= options.most_voxels; width += 0.5) {
     if (progress.should_stop()) return fail(cancelled("close tunnels"));
@@ -164,6 +169,7 @@ Result<ClosedTunnels> close_tunnels(Mask mask, const TunnelOptions& options,
       }
     }
   }
+
   Filled cavities = fill_cavities(std::move(out.mask));
   out.mask = std::move(cavities.mask);
   out.voxels += cavities.voxels;

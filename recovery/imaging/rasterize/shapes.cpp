@@ -43,6 +43,7 @@ Shape round_cone(const Vec3& a, double ra, const Vec3& b, double rb) {
   Shape s;
   s.low_mm = (a.array() - ra).min(b.array() - rb);
   s.high_mm = (a.array() + ra).max(b.array() + rb);
+
   const Vec3 ab = b - a;
   const double length_squared = ab.squaredNorm(), dr = ra - rb;
   if (length_squared <= dr * dr) {  // one ball holds the other
@@ -51,6 +52,7 @@ Shape round_cone(const Vec3& a, double ra, const Vec3& b, double rb) {
     s.inside = [c, r](const Vec3& p) { return (p - c).norm() - r; };
     return s;
   }
+
   // Quilez, "Round cone": the flank is a cone tangent to both balls; `lean` shifts the foot point.
   const double flank = std::sqrt(length_squared - dr * dr);
   const double length = std::sqrt(length_squared);
@@ -102,9 +104,12 @@ Image<float> coverage(const ImageGrid& grid, const std::vector<Shape>& shapes) {
   Image<float> out(grid);
   std::vector<VoxelBox> boxes;
   for (const Shape& s : shapes) boxes.push_back(voxels_of(s, grid));
+
+  // A voxel whose centre is farther from the surface than its diagonal's half is all in or all out.
   const double half_diagonal = grid.spacing_mm.norm() / 2;
   const std::size_t slice = grid.offset({0, 0, 1});
   std::vector<std::uint64_t> filled;
+
   for (int z0 = 0; z0 < grid.size[2]; z0 += kSlabSlices) {
     const int z1 = std::min(z0 + kSlabSlices, grid.size[2]);
     filled.assign(slice * static_cast<std::size_t>(z1 - z0), 0);
@@ -123,6 +128,7 @@ Image<float> coverage(const ImageGrid& grid, const std::vector<Shape>& shapes) {
                                      : samples_inside(shapes[k], centre, grid.spacing_mm);
           }
     }
+
     for (std::size_t i = 0; i < filled.size(); ++i)
       out.voxels[slice * static_cast<std::size_t>(z0) + i] =
           static_cast<float>(std::popcount(filled[i])) / 64.0F;

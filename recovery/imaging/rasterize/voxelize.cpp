@@ -50,11 +50,13 @@ class LineCaster {
     const double area = (t[1].y() - t[0].y()) * (t[2].z() - t[0].z()) -
                         (t[1].z() - t[0].z()) * (t[2].y() - t[0].y());
     if (area == 0) return;
+
     // Seen along x the outside of an entering triangle faces back: its area is negative.
     const int turn = area < 0 ? 1 : -1;
     const std::array<Vec3, 3> c = area > 0 ? t : std::array<Vec3, 3>{t[0], t[2], t[1]};
     const auto [y0, y1] = range(t[0].y(), t[1].y(), t[2].y(), lines_y_);
     const auto [z0, z1] = range(t[0].z(), t[1].z(), t[2].z(), lines_z_);
+
     for (int k = z0; k <= z1; ++k) {
       const double z = place(k);
       for (int j = y0; j <= y1; ++j) {
@@ -63,6 +65,7 @@ class LineCaster {
             !is_left(c[2], c[0], y, z)) {
           continue;
         }
+
         const double w0 = side_of(c[1], c[2], y, z), w1 = side_of(c[2], c[0], y, z),
                      w2 = side_of(c[0], c[1], y, z);
         const double x = (w0 * c[0].x() + w1 * c[1].x() + w2 * c[2].x()) / (w0 + w1 + w2);

@@ -132,12 +132,14 @@ double AdaptiveThreshold<T>::mean_of_brightest_connected(const Voxel& c, const B
     row = static_cast<std::uint16_t>(row | bit);
     return fresh;
   };
+
   mark(c);
   Voxel last = c;
   // Sums of differences: a neighbourhood of equal values gives their mean exactly.
   const double reference = grey(c);
   double sum = 0;
   int count = 1;
+
   while (count < wanted) {
     for (int z = std::max(last[2] - 1, box.low[2]); z <= std::min(last[2] + 1, box.high[2]); ++z)
       for (int y = std::max(last[1] - 1, box.low[1]); y <= std::min(last[1] + 1, box.high[1]); ++y)
@@ -149,6 +151,7 @@ double AdaptiveThreshold<T>::mean_of_brightest_connected(const Voxel& c, const B
           const double g = grey({x, y, z});
           if (std::isfinite(g)) rim[rim_count++] = {g, {x, y, z}};
         }
+
     if (rim_count == 0) break;
     Rim* best = std::max_element(rim, rim + rim_count,
                                  [](const Rim& a, const Rim& b) { return a.grey < b.grey; });
@@ -207,6 +210,7 @@ auto AdaptiveThreshold<T>::start(const Vec3& seed_mm, std::size_t index) const -
     return fail({ErrorKind::kBadInput, "seed is outside the image", where, place,
                  fmt::format("voxels go from (0, 0, 0) to ({}, {}, {}); world is LPS", size_[0] - 1,
                              size_[1] - 1, size_[2] - 1)});
+
   const Voxel seed = brightest_near(clicked);
   const double value = grey(seed);
   if (!admissible(value))
@@ -215,6 +219,8 @@ auto AdaptiveThreshold<T>::start(const Vec3& seed_mm, std::size_t index) const -
                  std::isfinite(floor_)
                      ? fmt::format("the background goes to {:.6g}", *options_.background)
                      : std::string("the grey value must be finite")});
+
+  // S1 begins on the seed's side of the two classes that the box falls into (Otsu 1979),
   const Box box = box_around(seed, half_, size_);
   std::vector<double> values;
   for_each(box, [&](const Voxel& v) {
@@ -225,6 +231,8 @@ auto AdaptiveThreshold<T>::start(const Vec3& seed_mm, std::size_t index) const -
     return fail({ErrorKind::kBadInput, "no vessel at the seed", where,
                  fmt::format("{}, grey value {}", place, static_cast<double>(image_[clicked])),
                  fmt::format("the voxels around it split at {:.6g}", sign_ * threshold)});
+
+  // as far as it is connected to the seed within the box.
   Start out{seed, {seed}};
   Mask taken;
   for (std::size_t i = 0; i < 3; ++i) taken.grid.size[i] = box.high[i] - box.low[i] + 1;

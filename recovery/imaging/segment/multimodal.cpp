@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
-#include <queue>
 
 #include <fmt/format.h>
 
 #include "recovery/imaging/segment/adaptive_threshold.h"
+#include "recovery/imaging/segment/growing_front.h"
 
 namespace angiospline {
 
@@ -54,15 +54,9 @@ struct Channel {
   }
 };
 
-struct Candidate {
-  double grey;
-  std::uint64_t order;
-  std::size_t at, parent;  // offsets in the world
-};
-struct LaterInQueue {
-  bool operator()(const Candidate& a, const Candidate& b) const {
-    return a.grey != b.grey ? a.grey < b.grey : a.order > b.order;
-  }
+// A voxel of the world and the one that queued it, by their offsets.
+struct Step {
+  std::size_t to, from;
 };
 
 class Grower {
@@ -85,7 +79,7 @@ class Grower {
   double brightness(const Vec3& point_mm) const;
   void label(const Voxel& v);
   void queue_neighbours(const Voxel& v);
-  void examine(const Candidate& c);
+  void examine(const Step& step);
 
   const ImageGrid& world_;
   const MultimodalOptions& options_;
@@ -93,8 +87,7 @@ class Grower {
   bool has_volume_ = false;
   VoxelFlags seen_;
   Mask mask_;
-  std::priority_queue<Candidate, std::vector<Candidate>, LaterInQueue> queue_;
-  std::uint64_t order_ = 0;
+  GrowingFront<Step> front_;
   MultimodalReport report_;
 };
 
@@ -127,7 +120,7 @@ void Grower::queue_neighbours(const Voxel& v) {
     const double g = brightness(world_.world_mm(n));
     if (!std::isfinite(g)) return;
     seen_.set(n, VoxelFlags::kSeen);
-    queue_.push({g, order_++, world_.offset(n), parent});
+    front_.push(g, {world_.offset(n), parent});
   });
 }
 
@@ -139,6 +132,7 @@ Result<void> Grower::start(const Vec3& seed_mm, std::size_t index) {
                  fmt::format("seed {}", index + 1),
                  fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", seed_mm[0], seed_mm[1], seed_mm[2]),
                  {}});
+
   for (Channel& c : channels_) {
     Vec3 place = seed_mm;  // in the channel's own world
     if (c.geometry != nullptr) {
@@ -146,6 +140,7 @@ Result<void> Grower::start(const Vec3& seed_mm, std::size_t index) {
       const Vec3 off_detector = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
       place = pixel ? c.image->grid.world_mm(Vec3((*pixel)[0], (*pixel)[1], 0)) : off_detector;
     }
+
     auto start = c.rule->start(place, index);
     if (!start) {
       start.error().where += c.geometry == nullptr ? " in the volume" : " in a projection";
@@ -153,16 +148,18 @@ Result<void> Grower::start(const Vec3& seed_mm, std::size_t index) {
     }
     for (const Voxel& v : start->voxels) c.rule->label_vessel(v);
   }
+
   label(seed);
   queue_neighbours(seed);
   return {};
 }
 
-void Grower::examine(const Candidate& c) {
-  const Vec3 point = world_.world_mm(world_.voxel(c.at));
-  const Vec3 parent = world_.world_mm(world_.voxel(c.parent));
+void Grower::examine(const Step& step) {
+  const Vec3 point = world_.world_mm(world_.voxel(step.to));
+  const Vec3 parent = world_.world_mm(world_.voxel(step.from));
   const std::size_t first_view = has_volume_ ? 1 : 0;
   const bool volume = has_volume_ && channels_.front().says_vessel(point);
+
   std::vector<char> said(channels_.size(), 0);
   if (has_volume_) said[0] = volume;
   bool views = channels_.size() > first_view;
@@ -170,35 +167,27 @@ void Grower::examine(const Candidate& c) {
     said[k] = channels_[k].says_vessel(point);
     views = views && said[k];
   }
+
   ++report_.examined;
   if (!volume && !views) {
     for (std::size_t k = 0; k < channels_.size(); ++k)
       if (!said[k]) channels_[k].reject(point);
     return;
   }
+
   (volume && views ? report_.by_both : volume ? report_.by_volume : report_.by_views) += 1;
   for (std::size_t k = 0; k < channels_.size(); ++k) channels_[k].accept(point, parent, said[k]);
-  label(world_.voxel(c.at));
-  queue_neighbours(world_.voxel(c.at));
+  label(world_.voxel(step.to));
+  queue_neighbours(world_.voxel(step.to));
 }
 
 Result<MultimodalReport> Grower::grow(const Progress& progress) {
   constexpr std::size_t kReportEvery = std::size_t{1} << 14;
-  while (!queue_.empty()) {
-    if (options_.max_examined && report_.examined >= *options_.max_examined) {
-      report_.limit_reached = true;
-      break;
-    }
-    if (report_.examined % kReportEvery == 0) {
-      if (progress.should_stop()) return fail(cancelled("segment"));
-      const double done = static_cast<double>(report_.examined);
-      progress.at("segment", done / (done + static_cast<double>(queue_.size())));
-    }
-    const Candidate c = queue_.top();
-    queue_.pop();
-    examine(c);
-  }
-  progress.at("segment", 1);
+  const Result<bool> limit_reached =
+      front_.grow(report_.examined, options_.max_examined, kReportEvery, progress,
+                  [&](const auto& candidate) { examine(candidate.at); });
+  if (!limit_reached) return fail(limit_reached.error());
+  report_.limit_reached = *limit_reached;
   return report_;
 }
 

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <queue>
 
 #include <fmt/format.h>
 
+#include "recovery/imaging/image/pixel_types.h"
 #include "recovery/imaging/segment/adaptive_threshold.h"
+#include "recovery/imaging/segment/growing_front.h"
 
 namespace angiospline {
 
@@ -35,16 +36,7 @@ Result<void> check(const GrowOptions& o) {
 
 namespace {
 
-struct Candidate {
-  double grey;
-  std::uint64_t order;  // of queueing: the tie rule
-  Voxel at;
-};
-struct LaterInQueue {
-  bool operator()(const Candidate& a, const Candidate& b) const {
-    return a.grey != b.grey ? a.grey < b.grey : a.order > b.order;
-  }
-};
+using Front = GrowingFront<Voxel>;
 
 template <typename T>
 class Grower {
@@ -68,17 +60,16 @@ class Grower {
     rule_.label_vessel(v);
     ++labelled_;
   }
-  void watch_front(const Candidate& c);
+  void watch_front(const Front::Candidate& c);
   void close_basin();
   void queue_neighbours(const Voxel& v, double fading = 1);
-  Decision decide(const Candidate& c);
+  Decision decide(const Voxel& v);
   Segmentation finished();
 
   const Image<T>& image_;
   const GrowOptions& options_;
   AdaptiveThreshold<T> rule_;
-  std::priority_queue<Candidate, std::vector<Candidate>, LaterInQueue> queue_;
-  std::uint64_t order_ = 0;
+  Front front_;
   GrowReport report_;
   double threshold_sum_ = 0;
   std::size_t labelled_ = 0;
@@ -93,13 +84,13 @@ void Grower<T>::queue_neighbours(const Voxel& v, double fading) {
     const double g = rule_.grey(n);
     if (!rule_.admissible(g, fading)) return;
     rule_.mark_seen(n);
-    queue_.push({g, order_++, n});
+    front_.push(g, n);
   });
 }
 
 template <typename T>
-Decision Grower<T>::decide(const Candidate& c) {
-  const Decision decision = rule_.decide(c.at);
+Decision Grower<T>::decide(const Voxel& v) {
+  const Decision decision = rule_.decide(v);
   const double threshold = rule_.sign() * decision.threshold;
   if (report_.examined == 0) report_.threshold_min = report_.threshold_max = threshold;
   report_.threshold_min = std::min(report_.threshold_min, threshold);
@@ -111,7 +102,7 @@ Decision Grower<T>::decide(const Candidate& c) {
 
 // The front takes the brightest voxel it touches: only behind a neck does it get brighter again.
 template <typename T>
-void Grower<T>::watch_front(const Candidate& c) {
+void Grower<T>::watch_front(const Front::Candidate& c) {
   if (c.grey >= darkest_) return;
   close_basin();
   darkest_ = c.grey;
@@ -149,20 +140,9 @@ Segmentation Grower<T>::finished() {
 template <typename T>
 Result<Segmentation> Grower<T>::grow(const Progress& progress) {
   constexpr std::size_t kReportEvery = std::size_t{1} << 16;
-  while (!queue_.empty()) {
-    if (options_.max_examined && report_.examined >= *options_.max_examined) {
-      report_.limit_reached = true;
-      break;
-    }
-    if (report_.examined % kReportEvery == 0) {
-      if (progress.should_stop()) return fail(cancelled("segment"));
-      const double done = static_cast<double>(report_.examined);
-      progress.at("segment", done / (done + static_cast<double>(queue_.size())));
-    }
-    const Candidate c = queue_.top();
-    queue_.pop();
-    if (rule_.is_vessel(c.at)) continue;  // a later seed's start took it
-    const Decision decision = decide(c);
+  const auto examine = [&](const Front::Candidate& c) {
+    if (rule_.is_vessel(c.at)) return;  // a later seed's start took it
+    const Decision decision = decide(c.at);
     if (decision.vessel) {
       watch_front(c);
       label(c.at);
@@ -170,8 +150,11 @@ Result<Segmentation> Grower<T>::grow(const Progress& progress) {
     } else {
       rule_.label_background(c.at);
     }
-  }
-  progress.at("segment", 1);
+  };
+  const Result<bool> limit_reached =
+      front_.grow(report_.examined, options_.max_examined, kReportEvery, progress, examine);
+  if (!limit_reached) return fail(limit_reached.error());
+  report_.limit_reached = *limit_reached;
   return finished();
 }
 
@@ -219,14 +202,7 @@ Result<Segmentation> grow_region(const AnyImage& image, const std::vector<Vec3>&
 #define ANGIOSPLINE_INSTANTIATE(T)                                                     \
   template Result<Segmentation> grow_region(const Image<T>&, const std::vector<Vec3>&, \
                                             const GrowOptions&, const Progress&);
-ANGIOSPLINE_INSTANTIATE(std::uint8_t)
-ANGIOSPLINE_INSTANTIATE(std::int8_t)
-ANGIOSPLINE_INSTANTIATE(std::uint16_t)
-ANGIOSPLINE_INSTANTIATE(std::int16_t)
-ANGIOSPLINE_INSTANTIATE(std::uint32_t)
-ANGIOSPLINE_INSTANTIATE(std::int32_t)
-ANGIOSPLINE_INSTANTIATE(float)
-ANGIOSPLINE_INSTANTIATE(double)
+ANGIOSPLINE_FOR_PIXEL_TYPES(ANGIOSPLINE_INSTANTIATE)
 #undef ANGIOSPLINE_INSTANTIATE
 
 }  // namespace angiospline

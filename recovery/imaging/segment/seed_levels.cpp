@@ -30,10 +30,12 @@ Cube cube_around(const AnyImage& image, const Voxel& centre, double half_mm, dou
     high[i] = std::min(grid.size[i] - 1, centre[i] + half);
     size[i] = high[i] - low[i] + 1;
   }
+
   const Image<float> box = smoothed_box(image, low, high, smoothing_mm);
   Cube cube;
   cube.grey.grid.size = size;
   cube.seed = {centre[0] - low[0], centre[1] - low[1], centre[2] - low[2]};
+
   for (int z = 0; z < size[2]; ++z)
     for (int y = 0; y < size[1]; ++y)
       for (int x = 0; x < size[0]; ++x) {
@@ -69,14 +71,19 @@ SeedLevels levels_in(const Cube& cube, double threshold, double half_mm, const I
     bright.voxels[i] = cube.grey.voxels[i] >= threshold;
     if (cube.grey.voxels[i] < threshold) background.push_back(cube.grey.voxels[i]);
   }
+
   const Components parts = connected_components(bright, Neighbours::kCorners26);
   const std::int32_t label = parts.labels[cube.seed];
   std::vector<double> vessel = inside_of(cube, parts, label);
+
   if (vessel.size() < 8) {  // too thin to have an inside
     vessel.clear();
     for (std::size_t i = 0; i < bright.voxels.size(); ++i)
       if (parts.labels.voxels[i] == label) vessel.push_back(cube.grey.voxels[i]);
   }
+
+  // Mean and deviation of the vessel; median and its deviation (Hampel 1974) of the background,
+  // which may hold other vessels.
   SeedLevels out;
   const double n = static_cast<double>(vessel.size());
   out.vessel = std::accumulate(vessel.begin(), vessel.end(), 0.0) / n;
@@ -86,6 +93,8 @@ SeedLevels levels_in(const Cube& cube, double threshold, double half_mm, const I
   out.background = median(background);
   for (double& v : background) v = std::abs(v - out.background);
   out.background_deviation = 1.4826 * median(background);
+
+  // The radius of a straight vessel of that volume through the cube.
   const double volume =
       static_cast<double>(parts.list[static_cast<std::size_t>(label - 1)].voxels) *
       grid.spacing_mm.prod();

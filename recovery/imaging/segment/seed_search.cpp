@@ -57,6 +57,7 @@ std::vector<Structure> structures_of(const Vesselness& v, float strongest,
   Mask strong(grid);
   for (std::size_t i = 0; i < strong.voxels.size(); ++i)
     strong.voxels[i] = v.answer.voxels[i] >= kStructure * strongest;
+
   const Components parts = connected_components(strong, Neighbours::kCorners26);
   std::vector<Structure> all(parts.list.size());
   for (std::size_t i = 0; i < strong.voxels.size(); ++i)
@@ -67,7 +68,9 @@ std::vector<Structure> structures_of(const Vesselness& v, float strongest,
     }
   std::stable_sort(all.begin(), all.end(),
                    [](const Structure& a, const Structure& b) { return a.total > b.total; });
+
   while (all.back().total < kLeastTotal * all.front().total) all.pop_back();
+
   for (Structure& s : all) {
     const auto answers_less = [&](std::size_t a, std::size_t b) {
       return v.answer.voxels[a] < v.answer.voxels[b];
@@ -75,6 +78,7 @@ std::vector<Structure> structures_of(const Vesselness& v, float strongest,
     const std::size_t core = *std::max_element(s.voxels.begin(), s.voxels.end(), answers_less);
     s.core_mm = grid.world_mm(grid.voxel(core));
     s.strength = static_cast<double>(v.answer.voxels[core]);
+
     std::vector<double> tubeness;
     std::size_t at_border = 0;
     for (const std::size_t i : s.voxels) {
@@ -84,6 +88,7 @@ std::vector<Structure> structures_of(const Vesselness& v, float strongest,
       if (2 * static_cast<double>(v.answer.voxels[i]) >= s.strength)
         tubeness.push_back(static_cast<double>(v.tubeness.voxels[i]));
     }
+
     s.tubeness = median(std::move(tubeness));
     s.border_share = static_cast<double>(at_border) / static_cast<double>(s.voxels.size());
     s.length_radii = extent_vox(grid, s.voxels, core) / radii_vox[v.scale.voxels[core]];
@@ -129,8 +134,12 @@ struct Judgement {
     const auto weaker = [](const Structure& a, const Structure& b) {
       return a.strength < b.strength;
     };
+
+    // Where the strongest structure of all is none, what answers elsewhere is judged against
+    // nothing.
     const bool sound = fault(*std::max_element(all.begin(), all.end(), weaker)) == nullptr;
     std::vector<std::size_t> away;
+
     for (const Structure& s : all) {
       Reason* reason = fault(s);
       if (reason == nullptr) {
@@ -140,6 +149,7 @@ struct Judgement {
       reason->add(s);
       if (!sound) away.insert(away.end(), s.voxels.begin(), s.voxels.end());
     }
+
     for (const Structure& s : all) {
       if (!sound || fault(s) != nullptr) continue;
       if (s.strength < options.least_strength * strongest)
@@ -149,6 +159,7 @@ struct Judgement {
       else
         more.add(s);
     }
+
     return away;
   }
 
@@ -168,6 +179,7 @@ Image<float> seed_grid_image(const AnyImage& image, Polarity polarity) {
   for (int i = 0; i < 3; ++i)
     extent[i] = grid.size[static_cast<std::size_t>(i)] * grid.spacing_mm[i];
   const double cell = std::max(extent.maxCoeff() / kSeedGrid, grid.spacing_mm.minCoeff());
+
   std::array<int, 3> block;
   ImageGrid coarse = grid;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -178,6 +190,8 @@ Image<float> seed_grid_image(const AnyImage& image, Polarity polarity) {
   }
   coarse.origin_mm =
       grid.world_mm(Vec3((block[0] - 1) / 2.0, (block[1] - 1) / 2.0, (block[2] - 1) / 2.0));
+
+  // Means over blocks; voxels that are not finite do not count.
   Image<float> out(coarse);
   const double sign = polarity == Polarity::kBright ? 1 : -1;
   std::visit(
@@ -200,6 +214,8 @@ Image<float> seed_grid_image(const AnyImage& image, Polarity polarity) {
         });
       },
       image);
+
+  // A block without any takes the darkest grey: nothing answers there.
   float lowest = 0;
   bool any = false;
   for (const float v : out.voxels)

@@ -41,6 +41,36 @@ double smoothing_mm(const AnyImage& image, const SegmentOptions& options) {
   return options.smoothing_vox * grid_of(image).spacing_mm.minCoeff();
 }
 
+// Sets the rule of growing that the levels at the seeds ask for, and says what it chose.
+void follow_levels(SeedLevels l, double sign, double voxel_mm, const SegmentOptions& options,
+                   GrowOptions& grow, SegmentReport& report) {
+  const double contrast = l.vessel - l.background;
+  grow.neighbourhood_vox =
+      std::clamp(2 * static_cast<int>(std::lround(l.radius_mm / voxel_mm)) + 1, 5, 11);
+
+  // M sigma is to be at most half the contrast: noise must not carry the threshold into the background.
+  grow.deviations = 2;
+  if (l.vessel_deviation > 0)
+    grow.deviations = std::clamp(0.5 * contrast / l.vessel_deviation, 1.0, 2.0);
+  const double floor = std::clamp(2 * l.background_deviation, 0.2 * contrast, 0.4 * contrast);
+  if (!options.background) grow.background = sign * (l.background + floor);
+  grow.background_level = sign * l.background;
+  grow.vessel_level = sign * l.vessel;
+
+  l.vessel *= sign;
+  l.background *= sign;
+  report.levels = l;
+  report.choices.push_back(fmt::format(
+      "at the seeds the vessel is {:.4g} +- {:.3g}, its background {:.4g} +- {:.3g}, its radius "
+      "about {:.2g} mm",
+      l.vessel, l.vessel_deviation, l.background, l.background_deviation, l.radius_mm));
+  if (!options.neighbourhood_vox)
+    report.choices.push_back(fmt::format("N = {}", grow.neighbourhood_vox));
+  if (!options.deviations) report.choices.push_back(fmt::format("M = {:.3g}", grow.deviations));
+  if (grow.background)
+    report.choices.push_back(fmt::format("background threshold {:.4g}", *grow.background));
+}
+
 // Fills in what the caller left open, and says so. Errors: a given seed without a vessel.
 Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
                            SegmentReport& report) {
@@ -48,6 +78,7 @@ Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
   grow.polarity = options.polarity;
   grow.smoothing_mm = smoothing_mm(image, options);
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
+
   std::vector<SeedLevels> all;
   for (const Vec3& seed : report.seeds_mm) {
     const Voxel at = voxel_at(grid_of(image), seed);
@@ -59,35 +90,16 @@ Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
     if (!report.seeds_found && !all_given && !shows_vessel(levels)) return fail(no_vessel_at(seed));
     if (levels) all.push_back(*levels);
   }
-  if (!all.empty()) {
-    SeedLevels l = median_of(all);
-    const double contrast = l.vessel - l.background;
-    const double r_vox = l.radius_mm / grid_of(image).spacing_mm.minCoeff();
-    grow.neighbourhood_vox = std::clamp(2 * static_cast<int>(std::lround(r_vox)) + 1, 5, 11);
-    grow.deviations = 2;
-    if (l.vessel_deviation > 0)
-      grow.deviations = std::clamp(0.5 * contrast / l.vessel_deviation, 1.0, 2.0);
-    const double floor = std::clamp(2 * l.background_deviation, 0.2 * contrast, 0.4 * contrast);
-    if (!options.background) grow.background = sign * (l.background + floor);
-    grow.background_level = sign * l.background;
-    grow.vessel_level = sign * l.vessel;
-    l.vessel *= sign;
-    l.background *= sign;
-    report.levels = l;
-    report.choices.push_back(fmt::format(
-        "at the seeds the vessel is {:.4g} +- {:.3g}, its background {:.4g} +- {:.3g}, its radius "
-        "about {:.2g} mm",
-        l.vessel, l.vessel_deviation, l.background, l.background_deviation, l.radius_mm));
-    if (!options.neighbourhood_vox)
-      report.choices.push_back(fmt::format("N = {}", grow.neighbourhood_vox));
-    if (!options.deviations) report.choices.push_back(fmt::format("M = {:.3g}", grow.deviations));
-    if (grow.background)
-      report.choices.push_back(fmt::format("background threshold {:.4g}", *grow.background));
-  } else {
+  if (all.empty()) {
     report.warnings.push_back(
         {WarningCode::kNoContrastAtSeeds,
          "no contrast was found around the seeds: the rule of growing is the plain one"});
+  } else {
+    follow_levels(median_of(all), sign, grid_of(image).spacing_mm.minCoeff(), options, grow,
+                  report);
   }
+
+  // What the caller gave has the last word.
   if (options.neighbourhood_vox) grow.neighbourhood_vox = *options.neighbourhood_vox;
   if (options.deviations) grow.deviations = *options.deviations;
   if (options.background) grow.background = options.background;
@@ -114,12 +126,14 @@ Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, Se
   Result<GrowOptions> choice = chosen(image, options, report);
   if (!choice) return fail(choice.error());
   GrowOptions grow = *choice;
+
   if (options.max_examined) most_examined = std::min(most_examined, *options.max_examined);
   grow.max_examined = most_examined;
   if (report.seeds_found) grow.seed_search_vox = 2;
   report.neighbourhood_vox = grow.neighbourhood_vox;
   report.deviations = grow.deviations;
   report.background = grow.background.value_or(0);
+
   Result<Segmentation> grown = grow_region(image, report.seeds_mm, grow, progress);
   if (!grown) return fail(grown.error());
   report.grown = std::move(grown->report);
@@ -127,6 +141,8 @@ Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, Se
     report.warnings.push_back(
         {WarningCode::kGrowingStopped,
          fmt::format("growing stopped after {} voxels examined", report.grown.examined)});
+
+  // What noise leaves in a mask: holes, cavities and tunnels too narrow to be loops of vessels.
   Filled holes = fill_holes(std::move(grown->mask), options.largest_hole_vox);
   Filled cavities = fill_cavities(std::move(holes.mask));
   Result<ClosedTunnels> closed = close_tunnels(std::move(cavities.mask), {}, progress);
@@ -135,6 +151,7 @@ Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, Se
   if (closed->tunnels > 0)
     report.choices.push_back(
         fmt::format("{} tunnels too narrow to be loops of vessels are filled", closed->tunnels));
+
   report.components = static_cast<std::size_t>(closed->topology.components);
   return Attempt{std::move(closed->mask), std::move(report), closed->topology.cycles};
 }
@@ -203,17 +220,20 @@ Result<Attempt> without_leak(const AnyImage& image, SegmentOptions options, Atte
     SegmentReport report;
     report.seeds_found = leaking.report.seeds_found;
     options.background = raised_background(leaking.report, sign);
+
     report.seeds_mm = seeds_beyond(image, leaking.report.seeds_mm, *options.background, sign,
                                    smoothing_mm(image, options));
     if (report.seeds_mm.empty() ||
         (!report.seeds_found && report.seeds_mm.size() < leaking.report.seeds_mm.size()))
       return leaking;
+
     report.choices = first_choices;
     report.choices.push_back(fmt::format(
         "the background threshold is {:.4g}, {} of {} seeds lie beyond it: with {:.4g} growing "
         "leaked into tissue ({} loops)",
         *options.background, report.seeds_mm.size(), leaking.report.seeds_mm.size(),
         leaking.report.background, leaking.loops));
+
     Result<Attempt> next = cautious_attempt(image, options, report, progress);
     if (!next) return fail(next.error());
     leaking = std::move(*next);
@@ -259,6 +279,8 @@ Result<Attempt> without_swelling(const AnyImage& image, SegmentOptions options, 
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
   const FrontLeap* largest = widest_neck(whole.report, sign);
   if (largest == nullptr) return whole;
+
+  // Grown once more, up to just above the neck: what is missing then lies behind it.
   const SeedLevels& levels = *whole.report.levels;
   options.background = largest->grey + kAboveNeck * (levels.vessel - levels.background);
   SegmentReport report;
@@ -266,11 +288,14 @@ Result<Attempt> without_swelling(const AnyImage& image, SegmentOptions options, 
   report.seeds_mm = seeds_beyond(image, whole.report.seeds_mm, *options.background, sign,
                                  smoothing_mm(image, options));
   if (report.seeds_mm.empty()) return whole;
+
   Result<Attempt> before = attempt(image, options, report, kNoLimit, progress);
   if (!before && before.error().kind == ErrorKind::kCancelled) return fail(before.error());
   if (!before) return whole;  // nothing grows from the seeds so bright
+
   std::optional<SwellingParts> parts = find_swelling(whole.mask, std::move(before->mask));
   if (!parts) return whole;
+
   parts->swelling.grey = largest->grey;
   parts->swelling.cut = options.cut_swellings;
   if (options.cut_swellings) {
@@ -279,6 +304,7 @@ Result<Attempt> without_swelling(const AnyImage& image, SegmentOptions options, 
     whole.loops = topology.cycles;
     whole.report.components = static_cast<std::size_t>(topology.components);
   }
+
   whole.report.warnings.push_back({WarningCode::kSwelling, swelling_text(parts->swelling)});
   whole.report.swelling = parts->swelling;
   return whole;
@@ -307,12 +333,15 @@ Result<Segmented> segment(const AnyImage& image, const SegmentOptions& options,
         fmt::format("{} seeds in the cores of the brightest tubes", report.seeds_mm.size()));
     report.choices.insert(report.choices.end(), seeds->left_out.begin(), seeds->left_out.end());
   }
+
   if (progress.should_stop()) return fail(cancelled("segment"));
+
   Result<Attempt> done = options.background ? attempt(image, options, report, kNoLimit, progress)
                                             : cautious_attempt(image, options, report, progress);
   if (done && done->leaks() && !options.background && done->report.levels)
     done = without_leak(image, options, std::move(*done), report.choices, progress);
   if (!done) return fail(done.error());
+
   if (done->leaks())
     done->report.warnings.push_back({WarningCode::kProbableLeak, leak_warning(*done)});
   else

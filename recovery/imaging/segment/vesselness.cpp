@@ -60,13 +60,18 @@ Result<Vesselness> vesselness(const Image<float>& image, const VesselnessOptions
   Vesselness best{Image<float>(image.grid), Image<float>(image.grid),
                   Image<std::uint8_t>(image.grid)};
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
+
   for (std::size_t k = 0; k < options.radii_vox.size(); ++k) {
     if (progress.should_stop()) return fail(cancelled("vesselness"));
     progress.at("vesselness",
                 static_cast<double>(k) / static_cast<double>(options.radii_vox.size()));
+
+    // A tube of radius r answers most at sigma = r / sqrt(2); sigma^2 makes scales comparable
+    // (Lindeberg 1998).
     const double sigma_vox = options.radii_vox[k] / std::sqrt(2.0);
     const Image<float> f = smoothed(image, sigma_vox * image.grid.spacing_mm.minCoeff());
     const double normalise = sign * sigma_vox * sigma_vox;
+
     tbb::parallel_for(0, image.grid.size[2], [&](int z) {
       for (int y = 0; y < image.grid.size[1]; ++y)
         for (int x = 0; x < image.grid.size[0]; ++x) {

@@ -86,6 +86,7 @@ ContactVessel vessel_through(const Exit& a, const Exit& b, double step_mm) {
   // Over two radii the curve takes up the chord's direction: side by side, vessels run straight.
   const double pull = std::min(length, a.radius + b.radius);
   const int n = std::max(2, static_cast<int>(std::ceil(length / step_mm)));
+
   std::vector<Vec3> points;
   const auto onward = [&](const Exit& e, int k) { return e.at + k * step_mm * e.outward; };
   const auto steps = [&](const Exit& e) {
@@ -98,6 +99,7 @@ ContactVessel vessel_through(const Exit& a, const Exit& b, double step_mm) {
     points.push_back((1 - h) * a.at + h * b.at - pull * u * a.outward - pull * w * b.outward);
   }
   for (int k = 1; k <= steps(b); ++k) points.push_back(onward(b, k));
+
   ContactVessel vessel;
   vessel.axis_mm.resize(3, std::ssize(points));
   for (Eigen::Index i = 0; i < vessel.axis_mm.cols(); ++i)
@@ -120,8 +122,8 @@ void measure(MaskContact& contact) {
 
 // The contact if the exits belong together as listed, two and two. `bridge_mm` is the least radius
 // of the branch between; none for a junction of four.
-std::optional<MaskContact> contact_of(const std::array<Exit, 4>& e,
-                                        std::optional<double> bridge_mm, double voxel) {
+std::optional<MaskContact> contact_of(const std::array<Exit, 4>& e, std::optional<double> bridge_mm,
+                                      double voxel) {
   if (!goes_through(e[0], e[1]) || !goes_through(e[2], e[3])) return std::nullopt;
   MaskContact contact;
   contact.a = vessel_through(e[0], e[1], 0.5 * voxel);
@@ -149,7 +151,7 @@ bool has_waist(const Mask& mask, const MaskContact& contact, double share) {
 // Of the three ways to pair four exits the likeliest that is a contact. Where vessels run side by
 // side, to cross looks as straight as to stay: only there the waist between them must show.
 std::optional<MaskContact> contact_of(const std::vector<Exit>& e, std::optional<double> bridge_mm,
-                                        const Mask& mask) {
+                                      const Mask& mask) {
   std::array<std::array<Exit, 4>, 3> ways{
       {{e[0], e[1], e[2], e[3]}, {e[0], e[2], e[1], e[3]}, {e[0], e[3], e[1], e[2]}}};
   const auto cost = [](const std::array<Exit, 4>& w) {
@@ -189,11 +191,13 @@ void add_branch(MaskContact& contact, const Exit& e, double step_mm) {
 // Of all ways to take two pairs out of five exits or more the likeliest that is a contact with a
 // waist.
 std::optional<MaskContact> contact_among(const std::vector<Exit>& e,
-                                           std::optional<double> bridge_mm, const Mask& mask) {
+                                         std::optional<double> bridge_mm, const Mask& mask) {
   struct Way {
     std::array<std::size_t, 4> of;
     double cost;
   };
+
+  // All ways to pair two and two of the exits, the likeliest first.
   std::vector<Way> ways;
   const std::size_t n = e.size();
   for (std::size_t i = 0; i < n; ++i)
@@ -204,11 +208,13 @@ std::optional<MaskContact> contact_among(const std::vector<Exit>& e,
             ways.push_back({{i, j, k, l}, unlikeness(e[i], e[j]) + unlikeness(e[k], e[l])});
   std::stable_sort(ways.begin(), ways.end(),
                    [](const Way& p, const Way& q) { return p.cost < q.cost; });
+
   const double voxel = voxel_mm(mask.grid);
   for (const Way& way : ways) {
     const auto& [i, j, k, l] = way.of;
     auto contact = contact_of(std::array{e[i], e[j], e[k], e[l]}, bridge_mm, voxel);
     if (!contact || !has_waist(mask, *contact, kWaist)) continue;
+
     const double thinner = std::min(contact->a.radius_mm, contact->b.radius_mm);
     if (bridge_mm && *bridge_mm >= kWaist * thinner) continue;
     for (std::size_t m = 0; m < n; ++m)
@@ -336,11 +342,14 @@ class ContactFinder {
     const auto from_axis = [&](const Vec3& p) {
       return std::sqrt((contact.a.axis_mm.colwise() - p).colwise().squaredNorm().minCoeff());
     };
+
+    // The neck: the thinnest place while the branch is still at the other vessel's wall.
     std::size_t neck = 0;
     for (std::size_t i = 1; i < branch.points.size(); ++i)
       if (branch.radii[i] < branch.radii[neck] &&
           from_axis(branch.points[i]) <= a + kTouchVoxels * voxel)
         neck = i;
+
     double length = branch.rest_mm, radius = 0;
     for (std::size_t i = neck + 1; i < branch.points.size(); ++i) {
       length += (branch.points[i] - branch.points[i - 1]).norm();
@@ -349,12 +358,15 @@ class ContactFinder {
     if (neck == 0 || branch.radii[neck] > radius - voxel || length < kGoesOn * radius ||
         branch.radii[neck] >= kNeck * std::min(a, radius))
       return false;
+
+    // Its axis from where it is itself, so far as it is straight.
     std::vector<Vec3> axis;
     for (std::size_t i = neck; i < branch.points.size(); ++i) {
       const double away = (branch.points[i] - branch.points[neck]).norm();
       if (away >= kEndToAxis * radius && away <= kOnward * radius) axis.push_back(branch.points[i]);
     }
     if (axis.empty()) return false;
+
     contact.b.radius_mm = radius;
     contact.b.axis_mm.resize(3, std::ssize(axis));
     for (Eigen::Index i = 0; i < contact.b.axis_mm.cols(); ++i)

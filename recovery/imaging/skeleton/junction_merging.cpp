@@ -61,6 +61,7 @@ class Merger {
       out.nodes.push_back(graph_.nodes[n]);
       out.nodes.back().arcs.clear();
     }
+
     for (std::size_t a = 0; a < graph_.arcs.size(); ++a) {
       if (gone_[a]) continue;
       VesselArc arc = std::move(graph_.arcs[a]);
@@ -71,6 +72,7 @@ class Merger {
       out.nodes[index(arc.to)].arcs.push_back(i);
       out.arcs.push_back(std::move(arc));
     }
+
     std::vector<int> roots;  // the first node of each component, or what took it in
     for (std::size_t n = 0; n < graph_.nodes.size(); ++n)
       if (n == 0 || graph_.nodes[n].component != graph_.nodes[n - 1].component)
@@ -97,15 +99,18 @@ class Merger {
     const int goes = from_stays ? bridge.to : bridge.from;
     std::vector<Voxel> way = bridge.voxels;  // from the node that stays to the one that goes
     if (!from_stays) std::reverse(way.begin(), way.end());
+
     gone_[a] = true;
     VesselNode& keeper = graph_.nodes[index(stays)];
     VesselNode& guest = graph_.nodes[index(goes)];
     std::erase(keeper.arcs, static_cast<int>(a));
     std::erase(guest.arcs, static_cast<int>(a));
+
     std::vector<int> moved = guest.arcs;
     std::sort(moved.begin(), moved.end());
     moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
     for (const int m : moved) lead_on(graph_.arcs[index(m)], goes, stays, way);
+
     keeper.arcs.insert(keeper.arcs.end(), guest.arcs.begin(), guest.arcs.end());
     keeper.cluster.insert(keeper.cluster.end(), guest.cluster.begin(), guest.cluster.end());
     keeper.cluster.insert(keeper.cluster.end(), way.begin(), way.end());
@@ -114,6 +119,7 @@ class Merger {
                          keeper.cluster.end());
     keeper.cluster_cycles += guest.cluster_cycles;
     keeper.cluster_cavities += guest.cluster_cavities;
+
     owner_[index(goes)] = stays;
   }
 

@@ -94,6 +94,7 @@ int main_point(const SkeletonLabels& s, const JunctionCluster& c) {
   for (const int i : c.members)
     for (std::size_t a = 0; a < 3; ++a) sum[a] += s.voxel(i)[a];
   const auto count = static_cast<std::int64_t>(c.members.size());
+
   int best = -1;
   int best_weight = -1;
   std::int64_t best_distance = std::numeric_limits<std::int64_t>::max();
@@ -131,11 +132,13 @@ SkeletonLabels label_skeleton(const Mask& skeleton, std::vector<std::size_t> off
                               Connectivity connectivity) {
   EXPECTS(std::is_sorted(offsets.begin(), offsets.end()));
   EXPECTS(offsets.size() < static_cast<std::size_t>(std::numeric_limits<int>::max()));
+
   SkeletonLabels s;
   s.grid = skeleton.grid;
   s.connectivity = connectivity;
   s.voxels = std::move(offsets);
   find_neighbors(s);
+
   s.labels.resize(s.voxels.size(), PointLabel::kMutual);
   s.cluster.assign(s.voxels.size(), -1);
   std::vector<int> counted(s.voxels.size(), -1);

@@ -135,15 +135,18 @@ class Pruner {
   void judge(std::size_t number) {
     const Branch& b = branches_[number];
     if (is_end(b.from) == is_end(b.to)) return;
+
     const int junction = junction_of(b);
     const ImageGrid& grid = graph_.grid;
     const Vec3 center = grid.world_mm(graph_.nodes[index(junction)].voxel);
     const double lumen = node_radius_mm_[index(junction)];
     const double voxel = options_.voxels * grid.spacing_mm.maxCoeff();
     const Voxel& end = end_voxel(b);
+
     // A branch whose end alone reaches far enough need not be looked at voxel by voxel.
     const double most = std::max(options_.radii, options_.corner_radii);
     if ((grid.world_mm(end) - center).norm() - lumen > most * b.radius_mm + voxel) return;
+
     double reach = 0.0;
     double radius = 0.0;
     double sum = 0.0;
@@ -157,6 +160,7 @@ class Pruner {
       sum += r;
       radius = std::max(radius, r);
     }
+
     const bool is_short = reach < options_.radii * radius + voxel;
     const bool is_corner = sum < options_.corner_fullness * radius * outside &&
                            reach < options_.corner_radii * radius + voxel;
@@ -175,15 +179,18 @@ class Pruner {
     const VesselNode& junction = graph_.nodes[index(node)];
     if (at_[index(node)].size() != 2 || junction.cluster_cycles + junction.cluster_cavities > 0)
       return;
+
     const std::size_t first = at_[index(node)][0];
     const std::size_t second = at_[index(node)][1];
     if (first == second) return;
+
     Branch a = std::move(branches_[first]);
     Branch b = std::move(branches_[second]);
     branches_[first] = Branch{a.from, a.to, {}, {}, 0.0, true};
     branches_[second] = Branch{b.from, b.to, {}, {}, 0.0, true};
     remove(first);
     remove(second);
+
     if (a.voxels.size() < b.voxels.size()) std::swap(a, b);  // the shorter is added to the longer
     const int far = b.from == node ? b.to : b.from;
     if (b.from != node) std::reverse(b.voxels.begin(), b.voxels.end());
@@ -194,6 +201,7 @@ class Pruner {
       a.voxels.insert(a.voxels.begin(), b.voxels.rbegin(), b.voxels.rend() - 1);
       a.from = far;
     }
+
     if (a.swallowed.size() < b.swallowed.size()) std::swap(a.swallowed, b.swallowed);
     a.swallowed.insert(a.swallowed.end(), b.swallowed.begin(), b.swallowed.end());
     a.swallowed.push_back(node);
@@ -238,8 +246,10 @@ Result<PrunedSkeleton> prune_twigs(const Mask& mask, Mask skeleton, const Prunin
   PrunedSkeleton result;
   result.skeleton = std::move(skeleton);
   for (std::uint8_t& v : result.skeleton.voxels) v = v != 0 ? 1 : 0;
+
   SkeletonLabels labels = label_skeleton(result.skeleton, options.connectivity);
   const AxisRadii radii(mask, labels);
+
   for (;;) {
     if (progress.should_stop()) return fail(cancelled("prune"));
     ++result.rounds;
@@ -248,6 +258,7 @@ Result<PrunedSkeleton> prune_twigs(const Mask& mask, Mask skeleton, const Prunin
     const std::vector<Voxel> cut = pruner.prune();
     if (pruner.twigs() == 0) return result;
     result.twigs += pruner.twigs();
+
     for (const Voxel& v : cut) result.skeleton[v] = 0;
     rethin(result.skeleton, labels.voxels, pruner.kept_ends(), options.connectivity);
     std::vector<std::size_t> left;
