@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
-#include "kernel/spline/basis.h"
+#include "kernel/spline/binomial.h"
 #include "kernel/spline/blossom.h"
 #include "kernel/spline/knot_algebra.h"
 

@@ -7,7 +7,7 @@
 #include "base/contract.h"
 #include "kernel/continuity/product.h"
 #include "kernel/refine/reshape.h"
-#include "kernel/spline/basis.h"
+#include "kernel/spline/binomial.h"
 #include "kernel/spline/knot_algebra.h"
 
 namespace angiospline {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "kernel/spline/basis.h"
+#include "kernel/spline/binomial.h"
 #include "kernel/spline/blossom.h"
 
 namespace angiospline {

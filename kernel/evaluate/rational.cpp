@@ -1,7 +1,7 @@
 #include "kernel/evaluate/rational.h"
 
 #include "base/contract.h"
-#include "kernel/spline/basis.h"
+#include "kernel/spline/binomial.h"
 
 namespace angiospline {
 namespace {

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "base/contract.h"
-#include "base/index.h"
 
 namespace angiospline {
 namespace {
@@ -110,20 +109,6 @@ void basis_on_span(const KnotVector& knots, int span, double t, int derivatives,
     default:
       return fill<0>(U, p, t, derivatives, out);
   }
-}
-
-double binomial(int n, int k) {
-  constexpr int kRows = 2 * KnotVector::kMaxDegree + 1;
-  static constexpr auto kPascal = [] {
-    std::array<std::array<double, kRows>, kRows> row{};
-    for (std::size_t i = 0; i < kRows; ++i) {
-      row[i][0] = 1;
-      for (std::size_t j = 1; j <= i; ++j) row[i][j] = row[i - 1][j - 1] + row[i - 1][j];
-    }
-    return row;
-  }();
-  EXPECTS(n >= 0 && n < kRows);
-  return k < 0 || k > n ? 0.0 : kPascal[index(n)][index(k)];
 }
 
 BasisValues basis_at(const KnotVector& knots, double t, int derivatives, int span_hint) {

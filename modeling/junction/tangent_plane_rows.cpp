@@ -6,7 +6,7 @@
 #include <Eigen/Dense>
 
 #include "base/index.h"
-#include "kernel/spline/basis.h"
+#include "kernel/spline/binomial.h"
 
 namespace angiospline {
 namespace {
