@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "recovery/imaging/segment/growing_labels.h"
 #include "recovery/imaging/segment/region_growing.h"
+#include "recovery/imaging/segment/rules.h"
 
 namespace angiospline::region_growing {
 
@@ -168,16 +169,14 @@ double AdaptiveThreshold<T>::mean_of_brightest_connected(const Voxel& c, const B
 // neighbourhood, since there the edges' partial volume would be taken for a fading signal.
 template <typename T>
 double AdaptiveThreshold<T>::fading(double s1_mean, std::size_t s1_count, const Box& box) const {
-  constexpr double kThick = 0.3;   // share of the neighbourhood that is vessel
-  constexpr double kEdges = 0.85;  // what the edges leave of the mean at the wall of such a vessel
-  constexpr double kMost = 0.25;
+  using namespace segmentation;
   if (!options_.vessel_level || !options_.background_level) return 1;
   if (sign_ < 0 || *options_.background_level < 0 || !(*options_.vessel_level > 0)) return 1;
   std::size_t volume = 1;
   for (std::size_t k = 0; k < 3; ++k)
     volume *= static_cast<std::size_t>(box.high[k] - box.low[k] + 1);
   if (static_cast<double>(s1_count) < kThick * static_cast<double>(volume)) return 1;
-  return std::clamp(s1_mean / (kEdges * *options_.vessel_level), kMost, 1.0);
+  return std::clamp(s1_mean / (kEdges * *options_.vessel_level), kLeastFading, 1.0);
 }
 
 template <typename T>
@@ -191,7 +190,7 @@ Decision AdaptiveThreshold<T>::decide(const Voxel& v) const {
   const double faded = fading(mean, s1.count, box);
   if (options_.background_level) {
     // Where the edge of a vessel lies: half way, less where M is generous.
-    constexpr double kSurely = 0.5, kHardly = 0.45;
+    using segmentation::kHardly, segmentation::kSurely;
     const double level = faded * sign_ * *options_.background_level;
     if (here >= level + kSurely * (mean - level)) return {true, threshold, faded};
     if (here < level + kHardly * (mean - level)) return {false, threshold, faded};

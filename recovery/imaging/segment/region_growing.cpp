@@ -111,10 +111,10 @@ void Grower<T>::watch_front(const Front::Candidate& c) {
 
 template <typename T>
 void Grower<T>::close_basin() {
-  constexpr std::size_t kLeast = 100, kLeastShare = 4;
+  using segmentation::kLeastLeap, segmentation::kLeastLeapShare;
   if (!std::isfinite(darkest_)) return;
   basin_.opened = labelled_ - basin_.before;
-  if (basin_.opened >= std::max(kLeast, basin_.before / kLeastShare))
+  if (basin_.opened >= std::max(kLeastLeap, basin_.before / kLeastLeapShare))
     report_.leaps.push_back(basin_);
 }
 

@@ -8,6 +8,7 @@
 #include "base/median.h"
 #include "recovery/imaging/image/gaussian.h"
 #include "recovery/imaging/mask/morphology.h"
+#include "recovery/imaging/segment/rules.h"
 
 namespace angiospline::segmentation {
 namespace {
@@ -76,7 +77,7 @@ SeedLevels levels_in(const Cube& cube, double threshold, double half_mm, const I
   const std::int32_t label = parts.labels[cube.seed];
   std::vector<double> vessel = inside_of(cube, parts, label);
 
-  if (vessel.size() < 8) {  // too thin to have an inside
+  if (vessel.size() < kLeastInside) {  // too thin to have an inside
     vessel.clear();
     for (std::size_t i = 0; i < bright.voxels.size(); ++i)
       if (parts.labels.voxels[i] == label) vessel.push_back(cube.grey.voxels[i]);
@@ -108,13 +109,14 @@ std::optional<SeedLevels> levels_at(const AnyImage& image, const Voxel& seed, do
                                     double smoothing_mm) {
   const ImageGrid& grid = grid_of(image);
   const double voxel = grid.spacing_mm.minCoeff();
-  for (double half = 5; half <= 80; half *= 1.4) {
+  for (double half = kSmallestCube; half <= kLargestCube; half *= kNextCube) {
     const Cube cube = cube_around(image, seed, half * voxel, sign, smoothing_mm);
-    if (cube.values.size() < 27) continue;
+    if (cube.values.size() < kLeastVoxels) continue;
     const double threshold = otsu_threshold(cube.values);
     const auto below = std::count_if(cube.values.begin(), cube.values.end(),
                                      [&](double v) { return v < threshold; });
-    if (static_cast<double>(below) < 0.6 * static_cast<double>(cube.values.size())) continue;
+    if (static_cast<double>(below) < kLeastBackground * static_cast<double>(cube.values.size()))
+      continue;
     if (!(cube.grey[cube.seed] >= threshold)) continue;
     return levels_in(cube, threshold, half * voxel, grid);
   }

@@ -9,18 +9,13 @@
 
 #include "base/median.h"
 #include "recovery/imaging/mask/morphology.h"
+#include "recovery/imaging/segment/rules.h"
 #include "recovery/imaging/segment/vesselness.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kSeedGrid = 192;
-constexpr int kUnknownBorder = 2;  // a border answers to what lies beyond it, which is not known
-constexpr int kBorder = 4, kThinImage = 16;
-constexpr double kMostBorder = 0.5, kLeastTubeness = 0.4, kLeastLength = 4;
-constexpr float kStructure = 0.25F;
-constexpr double kLeastTotal = 0.03;
-constexpr int kRounds = 4;  // each at less than a quarter of the answers before
+using namespace segmentation;
 
 bool near_border(const ImageGrid& grid, const Voxel& v, int reach, int thin) {
   for (std::size_t k = 0; k < 3; ++k)

@@ -9,6 +9,7 @@
 #include "recovery/imaging/mask/morphology.h"
 #include "recovery/imaging/mask/topology_numbers.h"
 #include "recovery/imaging/mask/tunnels.h"
+#include "recovery/imaging/segment/rules.h"
 #include "recovery/imaging/segment/seed_levels.h"
 #include "recovery/imaging/segment/seed_search.h"
 
@@ -18,11 +19,8 @@ using namespace segmentation;
 
 namespace {
 
-// Whether the grey values around a seed are those of a vessel in its background. Noise cut in two
-// at its middle has classes 1.9 apart, in root sums of their squared deviations, and by chance up
-// to 2.35 in the corners of the phantoms; a tube of radius 2.5 voxels at SNR 1, smoothed, has 2.7.
+// Whether the grey values around a seed are those of a vessel in its background.
 bool shows_vessel(const std::optional<SeedLevels>& levels) {
-  constexpr double kLeastSeparation = 2.4;
   return levels &&
          levels->vessel - levels->background >=
              kLeastSeparation * std::hypot(levels->vessel_deviation, levels->background_deviation);
@@ -46,13 +44,15 @@ void follow_levels(SeedLevels l, double sign, double voxel_mm, const SegmentOpti
                    GrowOptions& grow, SegmentReport& report) {
   const double contrast = l.vessel - l.background;
   grow.neighbourhood_vox =
-      std::clamp(2 * static_cast<int>(std::lround(l.radius_mm / voxel_mm)) + 1, 5, 11);
+      std::clamp(2 * static_cast<int>(std::lround(l.radius_mm / voxel_mm)) + 1, kLeastN, kMostN);
 
-  // M sigma is to be at most half the contrast: noise must not carry the threshold into the background.
-  grow.deviations = 2;
+  // M sigma is to be at most half the contrast: noise must not carry the threshold into the
+  // background.
+  grow.deviations = kMostM;
   if (l.vessel_deviation > 0)
-    grow.deviations = std::clamp(0.5 * contrast / l.vessel_deviation, 1.0, 2.0);
-  const double floor = std::clamp(2 * l.background_deviation, 0.2 * contrast, 0.4 * contrast);
+    grow.deviations = std::clamp(kMostOfContrast * contrast / l.vessel_deviation, kLeastM, kMostM);
+  const double floor = std::clamp(kBackgroundDeviations * l.background_deviation,
+                                  kLeastFloor * contrast, kMostFloor * contrast);
   if (!options.background) grow.background = sign * (l.background + floor);
   grow.background_level = sign * l.background;
   grow.vessel_level = sign * l.vessel;
@@ -108,7 +108,6 @@ Result<GrowOptions> chosen(const AnyImage& image, const SegmentOptions& options,
 
 // A tree of vessels has few loops (the circle of Willis one, a kissing pair one more); a leak into
 // tissue runs round every dark spot there.
-constexpr std::int64_t kLoopsOfALeak = 20;
 constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
 
 struct Attempt {
@@ -129,7 +128,7 @@ Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, Se
 
   if (options.max_examined) most_examined = std::min(most_examined, *options.max_examined);
   grow.max_examined = most_examined;
-  if (report.seeds_found) grow.seed_search_vox = 2;
+  if (report.seeds_found) grow.seed_search_vox = kSeedReach;
   report.neighbourhood_vox = grow.neighbourhood_vox;
   report.deviations = grow.deviations;
   report.background = grow.background.value_or(0);
@@ -159,7 +158,6 @@ Result<Attempt> attempt(const AnyImage& image, const SegmentOptions& options, Se
 // As attempt, but a leak is not followed to its end: vessels are a small part of an image.
 Result<Attempt> cautious_attempt(const AnyImage& image, const SegmentOptions& options,
                                  const SegmentReport& report, const Progress& progress) {
-  constexpr std::size_t kMuch = 10;  // one part in so many
   const std::size_t much = grid_of(image).voxel_count() / kMuch;
   Result<Attempt> first = attempt(image, options, report, much, progress);
   if (!first || first->leaks() || !first->report.grown.limit_reached) return first;
@@ -187,7 +185,6 @@ std::string leak_warning(const Attempt& leaking) {
 // A background threshold at which the leak should be shut: just above the neck behind which the
 // front first found more than it had before, or else a tenth of the contrast higher.
 double raised_background(const SegmentReport& report, double sign) {
-  constexpr double kStep = 0.1, kAboveNeck = 0.01;
   const double contrast = report.levels->vessel - report.levels->background;  // of either sign
   for (const FrontLeap& leap : report.grown.leaps)
     if (leap.opened >= leap.before && sign * leap.grey > sign * report.background)
@@ -198,12 +195,11 @@ double raised_background(const SegmentReport& report, double sign) {
 // The seeds that lie in what the threshold leaves of the vessels.
 std::vector<Vec3> seeds_beyond(const AnyImage& image, const std::vector<Vec3>& seeds,
                                double background, double sign, double smoothing) {
-  constexpr int kSearch = 2;
   std::vector<Vec3> left;
   for (const Vec3& seed : seeds) {
     const Voxel v = voxel_at(grid_of(image), seed);
     if (grid_of(image).contains(v) &&
-        brightest_near(image, v, kSearch, sign, smoothing).grey > sign * background)
+        brightest_near(image, v, kSeedReach, sign, smoothing).grey > sign * background)
       left.push_back(seed);
   }
   return left;
@@ -214,7 +210,6 @@ std::vector<Vec3> seeds_beyond(const AnyImage& image, const std::vector<Vec3>& s
 Result<Attempt> without_leak(const AnyImage& image, SegmentOptions options, Attempt leaking,
                              const std::vector<std::string>& first_choices,
                              const Progress& progress) {
-  constexpr int kAttempts = 8;
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
   for (int k = 0; k < kAttempts && leaking.leaks(); ++k) {
     SegmentReport report;
@@ -255,12 +250,10 @@ std::string swelling_text(const Swelling& s) {
 // The neck behind which the front found most, and at least as much as it had; null if there is
 // none. Where it is about as bright as the vessel it is no neck but noise.
 const FrontLeap* widest_neck(const SegmentReport& report, double sign) {
-  constexpr std::size_t kLeastBefore = 100;  // voxels: a piece of the vessel
-  constexpr double kDarker = 0.1, kDeviations = 3;
   if (!report.levels) return nullptr;
   const SeedLevels& l = *report.levels;
   const double darker =
-      std::max(kDarker * std::abs(l.vessel - l.background), kDeviations * l.vessel_deviation);
+      std::max(kDarker * std::abs(l.vessel - l.background), kDarkerDeviations * l.vessel_deviation);
   const FrontLeap* widest = nullptr;
   for (const FrontLeap& leap : report.grown.leaps)
     if (leap.before >= kLeastBefore && leap.opened >= leap.before &&
@@ -275,7 +268,6 @@ const FrontLeap* widest_neck(const SegmentReport& report, double sign) {
 // compares. Says so if a swelling lies there, and leaves it out if that was asked for.
 Result<Attempt> without_swelling(const AnyImage& image, SegmentOptions options, Attempt whole,
                                  const Progress& progress) {
-  constexpr double kAboveNeck = 0.01;
   const double sign = options.polarity == Polarity::kBright ? 1 : -1;
   const FrontLeap* largest = widest_neck(whole.report, sign);
   if (largest == nullptr) return whole;

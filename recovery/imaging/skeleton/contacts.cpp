@@ -10,24 +10,12 @@
 
 #include "base/index.h"
 #include "recovery/imaging/mask/distance_transform.h"
+#include "recovery/imaging/skeleton/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kMostBend = std::numbers::pi / 3;
-constexpr double kRadiusRatio = 1.7;
-constexpr double kCrossing = 0.55;    // of both radii: axes nearer than that do meet
-constexpr double kTouchVoxels = 1.5;  // between walls that still touch in the mask
-constexpr double kLongestBridge = 2.0;
-constexpr double kThinBridge = 0.6;
-constexpr double kOnward = 3.0;  // radii that an axis goes on straight beyond its exits
-constexpr double kExit = 1.5;    // lumen radii from a junction to where a branch is itself
-constexpr double kWaist = 0.8;   // between vessels that touch where one of them forks
-constexpr std::size_t kMostExits = 8;
-constexpr double kNeck = 0.7;        // of an end at a side, against the thinner vessel
-constexpr double kSearched = 6.0;    // lumen radii from a junction in which a branch is itself
-constexpr double kGoesOn = 3.0;      // radii of a vessel beyond its neck, at least
-constexpr double kEndToAxis = 0.75;  // radii from a vessel's end to where its axis begins
+using namespace contact_rules;
 
 double voxel_mm(const ImageGrid& grid) { return grid.spacing_mm.maxCoeff(); }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "recovery/analysis/compare_masks.h"
+#include "recovery/imaging/image/xray.h"
 #include "recovery/imaging/segment/multimodal.h"
 #include "recovery/phantoms/rings.h"
 

@@ -3,6 +3,7 @@
 #include "recovery/centerlines/vessels_from_mask.h"
 #include "recovery/imaging/mask/topology_numbers.h"
 #include "recovery/imaging/skeleton/contacts.h"
+#include "recovery/imaging/skeleton/rules.h"
 #include "tests/shapes/random_trees.h"
 
 namespace angiospline {
@@ -41,6 +42,7 @@ TEST(Contacts, OfTwoTubesThatKissAreFoundAndCut) {
       EXPECT_EQ(contact.kind, ContactKind::kKissing);
       EXPECT_LT((contact.at_mm - Vec3::Constant(40)).norm(), 3) << angle;
       EXPECT_NEAR(contact.distance_mm, ra + rb - 0.7, 1.5) << angle;
+      EXPECT_GE(contact.distance_mm, contact_rules::kCrossing * (ra + rb)) << angle;
       EXPECT_EQ(component_count(touching.tree), 1);
       const Vessels apart = vessels_from_mask(mask, cutting()).value();
       EXPECT_EQ(apart.contacts_cut, 1);
