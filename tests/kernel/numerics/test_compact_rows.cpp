@@ -1,4 +1,5 @@
 // Compact rows against the dense matrix they stand for.
+#include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -15,7 +16,7 @@ CompactRows random_rows(Random& random, int rows, int columns, int width) {
   std::vector<double> run(static_cast<std::size_t>(width));
   for (int r = 0; r < rows; ++r) {
     for (double& x : run) x = random.below(4) == 0 ? 0 : random.gaussian();
-    A.set_row(r, random.below(columns + width) - width + 1, run.data(), width);
+    A.set_row(r, random.below(columns + width - 1) - width + 1, run.data(), width);
   }
   return A;
 }

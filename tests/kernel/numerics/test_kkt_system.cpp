@@ -1,4 +1,6 @@
 // Constrained least squares steps against a dense solver.
+#include <algorithm>
+
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
