@@ -4,12 +4,14 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
 #include "kernel/fit/penalised_curve.h"
 #include "kernel/spline/basis.h"
+#include "modeling/body/rules.h"
 #include "modeling/body/seams.h"
 
 namespace angiospline {
@@ -28,6 +30,8 @@ Vec3 reflect(const Vec3& x, const Vec3& v) {
   return c > 0 ? Vec3(x - (2 * v.dot(x) / c) * v) : x;
 }
 
+// Frames that turn about the path no more than it makes them: the double reflection of Wang,
+// Juettler, Zheng, Liu 2008, ACM TOG 27(1), table I.
 std::vector<Station> stations_along(const BSplineCurve<4>& path, const BodyEnd& start,
                                     const BodyEnd& end, int count) {
   std::vector<Station> stations;
@@ -40,10 +44,13 @@ std::vector<Station> stations_along(const BSplineCurve<4>& path, const BodyEnd& 
     Vec3 tangent = path.at(t, 1).head<3>().normalized();
     if (i == 0) tangent = start.tangent;
     if (i == count) tangent = end.tangent;
+
     const Vec3 point = value.head<3>();
     if (i == 0) {
       e = any_orthogonal(tangent);
     } else {
+      // First in the plane that bisects the two points, then in the one that takes the tangent that
+      // came out of that to the tangent that is there.
       const Vec3 v = point - before_point;
       const Vec3 moved = reflect(before_tangent, v);
       e = reflect(reflect(e, v), tangent - moved);
@@ -147,7 +154,8 @@ std::vector<double> bisected(const std::vector<double>& breaks, const std::vecto
   std::vector<double> finer{breaks.front()};
   for (std::size_t s = 0; s < worst.size(); ++s) {
     const double width = breaks[s + 1] - breaks[s];
-    if (worst[s] > tolerance && width * static_cast<double>(stations) >= 8) {
+    if (worst[s] > tolerance &&
+        width * static_cast<double>(stations) >= SweepRules::kStationsToHalve) {
       finer.push_back(breaks[s] + width / 2);
     }
     finer.push_back(breaks[s + 1]);
@@ -155,41 +163,55 @@ std::vector<double> bisected(const std::vector<double>& breaks, const std::vecto
   return finer;
 }
 
+// Both rows of a closed ring of control points at one u: the points of the isoparametric curve and
+// their derivatives in u, with the first point once more at the end.
+struct RingAt {
+  Points3 points;
+  Points3 derivatives;
+};
+
+RingAt ring_at(const Body& body, double u) {
+  const BasisValues basis = basis_at(body.u, u, 1);
+  RingAt ring{Points3::Zero(3, body.ring() + 1), Points3::Zero(3, body.ring() + 1)};
+  for (int i = 0; i < body.u.order(); ++i) {
+    const auto row = body.net.middleCols((basis.first + i) * body.ring(), body.ring());
+    ring.points.leftCols(body.ring()) += basis.values(0, i) * row;
+    ring.derivatives.leftCols(body.ring()) += basis.values(1, i) * row;
+  }
+  ring.points.rightCols<1>() = ring.points.col(0);
+  ring.derivatives.rightCols<1>() = ring.derivatives.col(0);
+  return ring;
+}
+
 // Least (Su x Sv) . outward over its mean, on a grid of every strip.
 template <typename Center>
 double jacobian_ratio(const Body& body, const Center& center_at) {
-  const int steps = 4;
+  constexpr int kSteps = SweepRules::kJacobianSteps;
   const KnotVector bezier = KnotVector::bezier(5);
   const std::vector<double> breaks = body.u.breakpoints();
   double least = std::numeric_limits<double>::infinity();
   double sum = 0;
   int count = 0;
+  const auto measure = [&](const RingAt& ring, const Vec3& center, std::size_t strip, double v) {
+    const BasisValues basis = basis_at(bezier, v, 1);
+    const auto first = static_cast<Eigen::Index>(5 * strip);
+    const Vec3 p = ring.points.middleCols<6>(first) * basis.values.row(0).transpose();
+    const Vec3 pv = ring.points.middleCols<6>(first) * basis.values.row(1).transpose();
+    const Vec3 pu = ring.derivatives.middleCols<6>(first) * basis.values.row(0).transpose();
+    const double area = pu.cross(pv).dot((p - center).normalized());
+    least = std::min(least, area);
+    sum += area;
+    ++count;
+  };
+
+  // Every span of u, and of every strip the places that its neighbour does not begin with.
   for (std::size_t s = 0; s + 1 < breaks.size(); ++s) {
-    for (int a = 0; a <= steps; ++a) {
-      const double u = breaks[s] + (breaks[s + 1] - breaks[s]) * a / steps;
-      const BasisValues bu = basis_at(body.u, u, 1);
-      Points3 row = Points3::Zero(3, body.ring() + 1);
-      Points3 row_u = row;
-      for (int i = 0; i < body.u.order(); ++i) {
-        const auto ring = body.net.middleCols((bu.first + i) * body.ring(), body.ring());
-        row.leftCols(body.ring()) += bu.values(0, i) * ring;
-        row_u.leftCols(body.ring()) += bu.values(1, i) * ring;
-      }
-      row.rightCols<1>() = row.col(0);
-      row_u.rightCols<1>() = row_u.col(0);
+    for (int a = 0; a <= kSteps; ++a) {
+      const double u = breaks[s] + (breaks[s + 1] - breaks[s]) * a / kSteps;
+      const RingAt ring = ring_at(body, u);
       const Vec3 center = center_at(u);
       for (std::size_t k = 0; k < body.strips.size(); ++k) {
-        for (const double v : {0.0, 0.25, 0.5, 0.75}) {
-          const BasisValues bv = basis_at(bezier, v, 1);
-          const auto first = static_cast<Eigen::Index>(5 * k);
-          const Vec3 p = row.middleCols<6>(first) * bv.values.row(0).transpose();
-          const Vec3 pv = row.middleCols<6>(first) * bv.values.row(1).transpose();
-          const Vec3 pu = row_u.middleCols<6>(first) * bv.values.row(0).transpose();
-          const double area = pu.cross(pv).dot((p - center).normalized());
-          least = std::min(least, area);
-          sum += area;
-          ++count;
-        }
+        for (const double v : {0.0, 0.25, 0.5, 0.75}) measure(ring, center, k, v);
       }
     }
   }
@@ -204,6 +226,53 @@ std::vector<Arc> carried_arcs(const std::vector<Arc>& arcs, const Station& from,
     for (int j = 0; j < 6; ++j) arc.col(j) = to.world(from.local(arc.col(j)));
   }
   return carried;
+}
+
+// Ends without arcs take them from the other; if neither has any, two arcs about the path.
+void take_arcs(const Station& first, const Station& last, BodyEnd& start, BodyEnd& end) {
+  if (start.arcs.empty() && end.arcs.empty()) {
+    start.arcs = two_arc_circle(first.center, first.radius, start.tangent, first.e1);
+  }
+  if (start.arcs.empty()) start.arcs = carried_arcs(end.arcs, last, first);
+  if (end.arcs.empty()) end.arcs = carried_arcs(start.arcs, first, last);
+}
+
+// The body's net: all points of the ring fitted over u by one linear operator, so that what holds
+// between neighbours at every station holds between their splines. Spans are halved until the net
+// is within the tolerance of the sweep.
+void fit_net(const BSplineCurve<4>& path, const BodyEnd& start, const BodyEnd& end,
+             const Sweep& sweep, double tolerance, Body& body) {
+  SplineFitProblem problem;
+  problem.parameters = sweep.parameters;
+  problem.values = sweep.values;
+  const Eigen::RowVectorXd first_row = as_row(ring_on_arcs(body.strips, start, true));
+  const Eigen::RowVectorXd last_row = as_row(ring_on_arcs(body.strips, end, false));
+  const Departure leaving = departure_at(path, 0.0, start);
+  const Departure arriving = departure_at(path, 1.0, end);
+
+  std::vector<double> breaks{0.0, 1.0};
+  Eigen::MatrixXd control;
+  for (;;) {
+    body.u = KnotVector::clamped(5, breaks);
+    problem.first = held_rows(first_row, start, leaving, (breaks[1] - breaks[0]) / 5);
+    problem.last =
+        held_rows(last_row, end, arriving, -(breaks.back() - breaks[breaks.size() - 2]) / 5)
+            .colwise()
+            .reverse();
+    control = fit_spline(body.u, problem);
+    const std::vector<double> worst = deviations(body.u, control, sweep);
+    body.deviation = *std::max_element(worst.begin(), worst.end());
+    std::vector<double> finer = bisected(breaks, worst, tolerance, sweep.parameters.size());
+    if (finer.size() == breaks.size()) break;
+    breaks = std::move(finer);
+  }
+
+  body.net.resize(3, static_cast<Eigen::Index>(body.rows()) * body.ring());
+  for (int i = 0; i < body.rows(); ++i) {
+    for (int c = 0; c < body.ring(); ++c) {
+      body.net.col(i * body.ring() + c) = control.row(i).segment<3>(3 * c).transpose();
+    }
+  }
 }
 
 }  // namespace
@@ -233,53 +302,18 @@ std::vector<Arc> two_arc_circle(const Vec3& center, double radius, const Vec3& t
 Body make_body(const BodyPath& path, BodyEnd start, BodyEnd end, const BodyOptions& options) {
   EXPECTS(options.tolerance > 0);
   const int spans = static_cast<int>(path.curve.knots().breakpoints().size()) - 1;
-  const int count = std::max(24, 4 * spans);
+  const int count = std::max(SweepRules::kFewestStations, SweepRules::kStationsPerSpan * spans);
   if (start.tangent.isZero()) start = free_end(path.curve, 0.0);
   if (end.tangent.isZero()) end = free_end(path.curve, 1.0);
   const std::vector<Station> stations = stations_along(path.curve, start, end, count);
-  const Station& first = stations.front();
-  const Station& last = stations.back();
-  if (start.arcs.empty() && end.arcs.empty()) {
-    start.arcs = two_arc_circle(first.center, first.radius, start.tangent, first.e1);
-  }
-  if (start.arcs.empty()) start.arcs = carried_arcs(end.arcs, last, first);
-  if (end.arcs.empty()) end.arcs = carried_arcs(start.arcs, first, last);
+  take_arcs(stations.front(), stations.back(), start, end);
 
-  const SeamMatching match = match_seams(start, end, first, last);
-  const Sweep sweep = sweep_rings(stations, match.start, match.end);
+  const SeamMatching match = match_seams(start, end, stations.front(), stations.back());
   Body body;
   body.strips = match.strips;
   body.twist_rad = match.twist_rad;
-
-  SplineFitProblem problem;
-  problem.parameters = sweep.parameters;
-  problem.values = sweep.values;
-  const Eigen::RowVectorXd first_row = as_row(ring_on_arcs(match.strips, start, true));
-  const Eigen::RowVectorXd last_row = as_row(ring_on_arcs(match.strips, end, false));
-  const Departure leaving = departure_at(path.curve, 0.0, start);
-  const Departure arriving = departure_at(path.curve, 1.0, end);
-  std::vector<double> breaks{0.0, 1.0};
-  Eigen::MatrixXd control;
-  for (;;) {
-    body.u = KnotVector::clamped(5, breaks);
-    problem.first = held_rows(first_row, start, leaving, (breaks[1] - breaks[0]) / 5);
-    problem.last =
-        held_rows(last_row, end, arriving, -(breaks.back() - breaks[breaks.size() - 2]) / 5)
-            .colwise()
-            .reverse();
-    control = fit_spline(body.u, problem);
-    const std::vector<double> worst = deviations(body.u, control, sweep);
-    body.deviation = *std::max_element(worst.begin(), worst.end());
-    std::vector<double> finer = bisected(breaks, worst, options.tolerance, stations.size());
-    if (finer.size() == breaks.size()) break;
-    breaks = std::move(finer);
-  }
-  body.net.resize(3, static_cast<Eigen::Index>(body.rows()) * body.ring());
-  for (int i = 0; i < body.rows(); ++i) {
-    for (int c = 0; c < body.ring(); ++c) {
-      body.net.col(i * body.ring() + c) = control.row(i).segment<3>(3 * c).transpose();
-    }
-  }
+  fit_net(path.curve, start, end, sweep_rings(stations, match.start, match.end), options.tolerance,
+          body);
   body.jacobian_ratio =
       jacobian_ratio(body, [&](double u) { return Vec3(path.curve.at(u).head<3>()); });
   return body;
@@ -308,6 +342,8 @@ Body make_lofted_body(const BodyEnd& start, const BodyEnd& end) {
     b.col(k) += forward / 3 * start.tangent;
     c.col(k) -= backward / 3 * end.tangent;
   }
+
+  // One span of degree five in both directions: the cubics with their degree raised twice.
   Body body;
   body.strips = match.strips;
   body.twist_rad = match.twist_rad;

@@ -8,14 +8,10 @@
 #include <Eigen/Geometry>
 
 #include "modeling/body/path.h"
+#include "modeling/body/rules.h"
 
 namespace angiospline {
 namespace {
-
-constexpr double kStepRadii = 0.5;  // between places at which the course may be joined
-constexpr int kSteps = 20;
-constexpr std::array<double, 3> kReaches{1.0, 1.4, 2.0};  // of the quintic's speed, in chords
-constexpr int kSamples = 32;
 
 // A point of a curve with unit tangent and curvature vector, travelled away from the end.
 struct Place {
@@ -59,9 +55,9 @@ struct Quintic {
 };
 
 LeadIn sample(const Quintic& quintic, const BSplineCurve<4>& course, bool from_last, double joins) {
-  LeadIn lead{joins, Eigen::Matrix4Xd(4, kSamples), 0.0};
-  for (int i = 0; i < kSamples; ++i) {
-    const double u = static_cast<double>(i) / kSamples;
+  LeadIn lead{joins, Eigen::Matrix4Xd(4, LeadInRules::kSamples), 0.0};
+  for (int i = 0; i < LeadInRules::kSamples; ++i) {
+    const double u = static_cast<double>(i) / LeadInRules::kSamples;
     const auto [p, d1, d2] = quintic.at(u);
     const double radius = course.at(from_last ? 1 - u * joins : u * joins)(3);
     lead.samples.col(i) << p, radius;
@@ -81,13 +77,18 @@ std::optional<LeadIn> find_lead_in(const BSplineCurve<4>& course, bool from_last
   const Vec3 away = from_last ? Vec3(-end.direction) : end.direction;
   const double speed = course.at(from_last ? 1.0 : 0.0, 1).head<3>().norm();
   if (!(speed > 0)) return std::nullopt;
+
+  // The earliest place at which one of the quintics bends little enough, or the least bent of all.
   std::optional<LeadIn> best;
-  for (int k = 1; k <= kSteps; ++k) {
-    const double joins = kStepRadii * k * end.radius_mm / speed;
+  for (int k = 1; k <= LeadInRules::kSteps; ++k) {
+    const double joins = LeadInRules::kStepRadii * k * end.radius_mm / speed;
     if (joins > most) break;
     const Place to = place_at(course, from_last, joins);
     const double chord = (to.value.head<3>() - end.point_mm).norm();
-    for (const double reach : kReaches) {
+
+    // In its own parameter the quintic has the course's curvature where it joins: the second
+    // derivative is the speed squared times that.
+    for (const double reach : LeadInRules::kReaches) {
       const double v = reach * chord;
       const Quintic quintic(end.point_mm, v * away, Vec3::Zero(), to.value.head<3>(),
                             v * to.tangent, v * v * to.curvature);

@@ -22,6 +22,7 @@ std::vector<BodyStrip> make_strips(int start_arcs, int end_arcs, int start_shift
   for (int i = 0; i <= end_arcs; ++i) breaks.push_back(i * (both / end_arcs));
   std::sort(breaks.begin(), breaks.end());
   breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
+
   const auto part = [&](int from, int to, int arcs, int shift) {
     const int width = both / arcs;
     const int arc = from / width;
@@ -52,6 +53,7 @@ RingShape ring_shape(const std::vector<BodyStrip>& strips, const BodyEnd& end,
     const Arc arc = end.arcs[index(part.arc)] * arc_part_weights(part.from, part.to).transpose();
     std::array<Vec2, 6> p;
     for (int j = 0; j < 6; ++j) p[index(j)] = station.local(arc.col(j));
+
     StripShape s;
     s.share = (part.to - part.from) / static_cast<double>(end.arcs.size());
     // Less than half a turn lies between control points of a strip: the nearest angle is meant.
@@ -60,6 +62,8 @@ RingShape ring_shape(const std::vector<BodyStrip>& strips, const BodyEnd& end,
     const Vec2 radial = p[0] / s.seam_radius;
     const Vec2 speed = 5 * (p[1] - p[0]) / s.share;
     s.seam_speed = Vec2(radial.dot(speed), -radial.y() * speed.x() + radial.x() * speed.y());
+
+    // The two control points in the middle, each the nearest way round from the one before.
     angle = s.seam_angle;
     for (int j = 0; j < 2; ++j) {
       s.angle[index(j)] = angle = unwrapped(angle_of(p[index(2 + j)]), angle);
@@ -101,11 +105,16 @@ std::vector<Vec2> blend_rings(const RingShape& a, const RingShape& b, double w) 
   for (std::size_t k = 0; k < n; ++k) {
     const StripShape& p = a[k];
     const StripShape& q = b[k];
+
+    // The seam and the vector along the ring there, in polar coordinates, so that the ring stays
+    // round while it turns.
     const double angle = mix(p.seam_angle, q.seam_angle, w);
     const Vec2 radial(std::cos(angle), std::sin(angle));
     const Vec2 seam = mix(p.seam_radius, q.seam_radius, w) * radial;
     const Vec2 speed = mix(p.seam_speed.x(), q.seam_speed.x(), w) * radial +
                        mix(p.seam_speed.y(), q.seam_speed.y(), w) * Vec2(-radial.y(), radial.x());
+
+    // Its neighbours lie on both sides along that one vector: this keeps the ratio.
     ring[5 * k] = seam;
     ring[5 * k + 1] = seam + p.share / 5 * speed;
     ring[(5 * k + 5 * n - 1) % (5 * n)] = seam - a[(k + n - 1) % n].share / 5 * speed;
@@ -122,6 +131,8 @@ SeamMatching match_seams(const BodyEnd& start, const BodyEnd& end, const Station
                          const Station& last) {
   const int a = static_cast<int>(start.arcs.size());
   const int b = static_cast<int>(end.arcs.size());
+
+  // Every pair is tried: there are few arcs, and a tie goes to the first.
   SeamMatching best;
   best.twist_rad = std::numeric_limits<double>::infinity();
   for (int i = 0; i < a; ++i) {

@@ -38,6 +38,8 @@ class Assembler {
     for (Eigen::Index c = 0; c < part.control_points_mm.cols(); ++c) {
       pool_.push_back(part.control_points_mm.col(c));
     }
+
+    // Its numbers go up by what the network has already.
     network_.regions.insert(network_.regions.end(), part.regions.begin(), part.regions.end());
     for (Patch patch : part.patches) {
       for (int& c : patch.control) c += offset.point;
@@ -111,6 +113,9 @@ class Assembler {
       const ArcPart& part = at_start ? body.strips[k].start : body.strips[k].end;
       const std::array<int, 6>& masters = arcs[index(part.arc)];
       const Eigen::Matrix<double, 6, 6> weights = arc_part_weights(part.from, part.to);
+
+      // A column that is none of the arc's own is what subdividing the arc gives there: it moves
+      // with them, as a Dependency (thesis 3.2).
       for (int j = 0; j < 5; ++j) {
         if (part.whole() || (j == 0 && part.from == 0.0)) {
           row.push_back(masters[index(j)]);
@@ -156,10 +161,13 @@ class Assembler {
     const int region = region_named(piece.name, piece.radius_mm);
     const int first_patch = static_cast<int>(network_.patches.size());
     const int strips = static_cast<int>(body.strips.size());
+
+    // Rows are numbered in the pool first: those at the ends may be a junction's own.
     std::vector<std::vector<int>> rows;
     rows.push_back(end_row(junctions, piece, true));
     for (int i = 1; i + 1 < body.rows(); ++i) rows.push_back(own_row(body, i));
     rows.push_back(end_row(junctions, piece, false));
+
     for (int k = 0; k < strips; ++k) {
       Patch patch{body.u, KnotVector::bezier(5), {}, region};
       for (const std::vector<int>& row : rows) {
@@ -173,6 +181,7 @@ class Assembler {
            {first_patch + (k + 1) % strips, PatchSide::kV0, body.u.first(), body.u.last()},
            false});
     }
+
     close_end(junctions, piece, first_patch, true);
     close_end(junctions, piece, first_patch, false);
   }

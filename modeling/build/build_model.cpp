@@ -16,37 +16,35 @@
 #include "modeling/build/built_junction.h"
 #include "modeling/build/make_room.h"
 #include "modeling/build/plan.h"
+#include "modeling/build/plan_bends.h"
+#include "modeling/build/plan_edits.h"
+#include "modeling/build/plan_settling.h"
 #include "modeling/build/planned_body.h"
+#include "modeling/build/rules.h"
+#include "modeling/tree/clean_tree.h"
 #include "modeling/tree/keep_apart.h"
-#include "modeling/tree/unit_rounding.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kJunctionRounds = 6;  // of building, changing the plan of what failed, building again
-constexpr std::array<double, 3> kForwardRadii{1.0, 2.0, 4.0};  // of the first rounds, each on top
-constexpr int kBendRounds = 5;         // of letting branches bend inside their junctions, at most
-constexpr double kReachFarther = 1.6;  // times the distance at which directions are taken
-constexpr double kMergeReach = 6.0;    // radii of branch between junctions that may be merged
-constexpr std::size_t kCrowded = 6;    // branches beyond which a junction of several is cut
-constexpr std::size_t kMayGrow = 5;    // of one that failed and may be merged with another
-constexpr int kRoomRounds = 24;        // of cutting junctions and planning again,
-constexpr int kRoomBuilds = 5;         // and of building what was planned
-constexpr int kMergePasses = 3;        // of merging junctions between which the body folds
-
-class Seeder {
+// One attempt at a model: the plan of a tree, its junctions and bodies, and the rounds in which
+// what failed is planned and built again.
+class ModelBuilder {
  public:
-  Seeder(const SmoothedTree& tree, const BuildOptions& options, const Progress& progress)
-      : tree_(tree), options_(options), progress_(progress), plan_(tree, options.junction) {
+  ModelBuilder(const SmoothedTree& tree, const BuildOptions& options, const Progress& progress)
+      : tree_(tree),
+        options_(options),
+        progress_(progress),
+        plan_(make_plan(tree, options.junction)) {
     find_flow();
-    built_.resize(plan_.nodes().size());
+    built_.resize(plan_.nodes.size());
     built_before_.resize(built_.size());
   }
 
   // Junctions of a former plan: those that are planned again as they were are not built again.
   void reuse(BuiltByName known) {
     for (std::size_t n = 0; n < built_.size(); ++n) {
-      const auto found = known.find(plan_.nodes()[n].spec.name);
+      const auto found = known.find(plan_.nodes[n].spec.name);
       if (found != known.end()) built_[n] = std::move(found->second);
     }
   }
@@ -63,37 +61,36 @@ class Seeder {
   // Junctions that became one of too many branches, and those of several that could not be
   // built, or of many only as no fair surface.
   std::vector<PlannedNode> crowded() const {
-    return merged_nodes([&](std::size_t n) { return plan_.nodes()[n].ends.size() > kCrowded; });
+    return merged_nodes(
+        [&](std::size_t n) { return plan_.nodes[n].ends.size() > RetryRules::kCrowded; });
   }
   std::vector<PlannedNode> failed() const {
     return merged_nodes([&](std::size_t n) {
-      const bool many = plan_.nodes()[n].ends.size() > kMayGrow;
+      const bool many = plan_.nodes[n].ends.size() > RetryRules::kMayGrow;
       return !built_[n].junction || (many && !built_[n].junction->fair);
     });
   }
 
   Result<Model> run() {
-    plan_.find_bends();
+    find_bends(plan_);
     const Plan unbent = plan_;
-    refused_.assign(plan_.nodes().size(), 0);
-    for (int round = 0; round < kBendRounds; ++round) {
-      bent_ = plan_.bend(refused_);
-      if (bent_.empty() || build_bent()) break;
-      if (progress_.should_stop()) return fail(cancelled("junctions"));
-      plan_ = unbent;
-      bent_.clear();
-    }
+    if (!let_branches_bend(unbent)) return fail(cancelled("junctions"));
+
+    // Each pass starts from junctions that are all built or given up. A body that folds beside a
+    // junction inside which branches bend has lost its room to it: that junction is planned as it
+    // was. One that folds all the same makes one junction of its two.
     for (int merges = 0;;) {
       if (!build_junctions()) return fail(cancelled("junctions"));
       number_junctions();
       if (!build_bodies()) return fail(cancelled("bodies"));
       if (unbend_folded()) {
         plan_ = unbent;
-        bent_ = plan_.bend(refused_);
+        bent_ = bend(plan_, refused_);
         continue;
       }
-      if (merges++ == kMergePasses || !merge_folded()) break;
+      if (merges++ == RetryRules::kMergePasses || !merge_folded()) break;
     }
+
     progress_.at("assemble", 0.0);
     if (pieces_.empty() && junctions_.empty()) {
       return fail({ErrorKind::kFailed,
@@ -102,15 +99,7 @@ class Seeder {
                    failed_.empty() ? std::string() : failed_.front().why,
                    {}});
     }
-    Model model;
-    model.network = assemble(junctions_, pieces_, closed_);
-    model.tree = tree_.tree;
-    model.assumptions = tree_.tree.assumptions;
-    model.warnings = tree_.warnings;
-    model.warnings.insert(model.warnings.end(), plan_.warnings().begin(), plan_.warnings().end());
-    model.warnings.insert(model.warnings.end(), warnings_.begin(), warnings_.end());
-    warn_of_unfair_junctions(model);
-    model.failed = std::move(failed_);
+    Model model = assembled();
     progress_.at("assemble", 1.0);
     return model;
   }
@@ -120,17 +109,47 @@ class Seeder {
   std::vector<PlannedNode> merged_nodes(const Predicate& is_wanted) const {
     std::vector<PlannedNode> nodes;
     for (std::size_t n = 0; n < built_.size(); ++n) {
-      const PlannedNode& node = plan_.nodes()[n];
+      const PlannedNode& node = plan_.nodes[n];
       if (node.is_junction() && !node.absorbed.empty() && is_wanted(n)) nodes.push_back(node);
     }
     return nodes;
   }
 
+  Model assembled() {
+    Model model;
+    model.network = assemble(junctions_, pieces_, closed_);
+    model.tree = tree_.tree;
+    model.assumptions = tree_.tree.assumptions;
+    const std::array<const std::vector<Warning>*, 3> all{&tree_.warnings, &plan_.warnings,
+                                                         &warnings_};
+    for (const auto* warnings : all) {
+      model.warnings.insert(model.warnings.end(), warnings->begin(), warnings->end());
+    }
+    warn_of_unfair_junctions(model);
+    model.failed = std::move(failed_);
+    return model;
+  }
+
   // ---- junctions
+
+  // Branches bend inside their junctions where that spares their bodies: one way after the other is
+  // refused until all that remain can be built. After the last round nodes stay as they were. False
+  // if stopped.
+  bool let_branches_bend(const Plan& unbent) {
+    refused_.assign(plan_.nodes.size(), 0);
+    for (int round = 0; round < RetryRules::kBendRounds; ++round) {
+      bent_ = bend(plan_, refused_);
+      if (bent_.empty() || build_bent()) break;
+      if (progress_.should_stop()) return false;
+      plan_ = unbent;
+      bent_.clear();
+    }
+    return true;
+  }
 
   // Whether this node's junction, as it is planned now, has been built before; then it is there.
   bool is_built(int n) {
-    const JunctionSpec& wanted = plan_.nodes()[index(n)].spec;
+    const JunctionSpec& wanted = plan_.nodes[index(n)].spec;
     BuiltJunction& now = built_[index(n)];
     if (same(now.spec, wanted)) return true;
     std::vector<BuiltJunction>& before = built_before_[index(n)];
@@ -155,7 +174,7 @@ class Seeder {
     }
     tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
       built_[index(work[k])] =
-          build_bent_junction(plan_.nodes()[index(work[k])], options_.junction, progress_);
+          build_bent_junction(plan_.nodes[index(work[k])], options_.junction, progress_);
     });
     bool all = true;
     for (const int n : bent_) {
@@ -170,7 +189,7 @@ class Seeder {
   bool unbend_folded() {
     bool any = false;
     for (const int b : folded_) {
-      const PlannedBranch& branch = plan_.branches()[index(b)];
+      const PlannedBranch& branch = plan_.branches[index(b)];
       for (const int n : {branch.from, branch.to}) {
         if (std::find(bent_.begin(), bent_.end(), n) == bent_.end()) continue;
         ++refused_[index(n)];
@@ -180,22 +199,27 @@ class Seeder {
     return any;
   }
 
+  // The junctions of the plan that were not built before, in parallel.
+  void build_planned_junctions() {
+    std::vector<int> work;
+    for (int n = 0; n < static_cast<int>(plan_.nodes.size()); ++n) {
+      if (plan_.nodes[index(n)].is_junction() && !is_built(n)) work.push_back(n);
+    }
+    std::atomic<std::size_t> done{0};
+    tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
+      if (progress_.should_stop()) return;
+      built_[index(work[k])] =
+          build_junction(plan_.nodes[index(work[k])], options_.junction, progress_);
+      progress_.at("junctions", static_cast<double>(++done) / static_cast<double>(work.size()));
+    });
+  }
+
+  // Builds, changes the plan of what failed, and builds that again. False if stopped.
   bool build_junctions() {
-    for (int round = 0; round < kJunctionRounds; ++round) {
-      std::vector<int> work;
-      for (int n = 0; n < static_cast<int>(plan_.nodes().size()); ++n) {
-        const PlannedNode& node = plan_.nodes()[index(n)];
-        if (node.is_junction() && !is_built(n)) work.push_back(n);
-      }
-      std::atomic<std::size_t> done{0};
-      tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t k) {
-        if (progress_.should_stop()) return;
-        built_[index(work[k])] =
-            build_junction(plan_.nodes()[index(work[k])], options_.junction, progress_);
-        progress_.at("junctions", static_cast<double>(++done) / static_cast<double>(work.size()));
-      });
+    for (int round = 0; round < RetryRules::kJunctionRounds; ++round) {
+      build_planned_junctions();
       if (progress_.should_stop()) return false;
-      if (round + 1 == kJunctionRounds || !change_failed(round)) break;
+      if (round + 1 == RetryRules::kJunctionRounds || !change_failed(round)) break;
     }
     return true;
   }
@@ -206,20 +230,21 @@ class Seeder {
   bool change_failed(int round) {
     bool changed = false;
     for (int n = 0; n < static_cast<int>(built_.size()); ++n) {
-      const PlannedNode& node = plan_.nodes()[index(n)];
+      const PlannedNode& node = plan_.nodes[index(n)];
       if (!node.is_junction() || built_[index(n)].junction) continue;
-      if (!node.absorbed.empty() && node.ends.size() > kMayGrow) continue;  // it is to be cut
-      if (index(round) < kForwardRadii.size()) {
-        plan_.move_forward(n, kForwardRadii[index(round)]);
+      if (!node.absorbed.empty() && node.ends.size() > RetryRules::kMayGrow)
+        continue;  // it is to be cut
+      if (index(round) < RetryRules::kForwardRadii.size()) {
+        move_forward(plan_, n, RetryRules::kForwardRadii[index(round)]);
         changed = true;
-      } else if (plan_.merge_with_nearest(n, kMergeReach)) {
+      } else if (merge_with_nearest(plan_, n, RetryRules::kMergeReach)) {
         changed = true;
       } else {
-        plan_.reach_farther(n, kReachFarther);
+        reach_farther(plan_, n, RetryRules::kReachFarther);
         changed = true;
       }
     }
-    if (changed) plan_.settle();
+    if (changed) settle(plan_);
     return changed;
   }
 
@@ -228,7 +253,7 @@ class Seeder {
     junctions_.clear();
     failed_.clear();
     for (std::size_t n = 0; n < built_.size(); ++n) {
-      const PlannedNode& node = plan_.nodes()[n];
+      const PlannedNode& node = plan_.nodes[n];
       if (!node.is_junction()) continue;
       if (built_[n].junction) {
         number_[n] = static_cast<int>(junctions_.size());
@@ -255,8 +280,10 @@ class Seeder {
 
   // ---- bodies
 
+  // The bodies of all live branches, in parallel; then taken apart in the branches' order. False if
+  // stopped.
   bool build_bodies() {
-    const std::vector<PlannedBranch>& branches = plan_.branches();
+    const std::vector<PlannedBranch>& branches = plan_.branches;
     const BodySurroundings around{tree_, plan_, options_, junctions_, number_, flow_};
     std::vector<PlannedBody> outcomes(branches.size());
     std::atomic<std::size_t> done{0};
@@ -266,6 +293,7 @@ class Seeder {
       progress_.at("bodies", static_cast<double>(++done) / static_cast<double>(branches.size()));
     });
     if (progress_.should_stop()) return false;
+
     pieces_.clear();
     closed_.clear();
     warnings_.clear();
@@ -284,8 +312,8 @@ class Seeder {
   // Junctions between which no body fits become one.
   bool merge_folded() {
     bool merged = false;
-    for (const int b : folded_) merged = plan_.merge_along(b) || merged;
-    if (merged) plan_.settle();
+    for (const int b : folded_) merged = merge_along(plan_, b) || merged;
+    if (merged) settle(plan_);
     return merged;
   }
 
@@ -321,9 +349,9 @@ Result<Model> build_model(const CenterlineTree& tree, const BuildOptions& option
                           const Progress& progress) {
   Result<SmoothedTree> smoothed = smooth_for_build(tree, options, progress);
   if (!smoothed) return fail(smoothed.error());
-  Result<BuiltModel> seeded = build_with_room(*std::move(smoothed), options, progress);
-  if (!seeded) return fail(seeded.error());
-  return std::move(seeded->model);
+  Result<BuiltModel> built = build_with_room(*std::move(smoothed), options, progress);
+  if (!built) return fail(built.error());
+  return std::move(built->model);
 }
 
 Result<SmoothedTree> smooth_for_build(const CenterlineTree& tree, const BuildOptions& options,
@@ -354,34 +382,38 @@ Result<Model> build_smoothed(const SmoothedTree& tree, const BuildOptions& optio
                              const Progress& progress) {
   if (const auto error = without_branches(tree)) return fail(*error);
   progress.at("plan", 0.0);
-  Seeder seeder(tree, options, progress);
-  return checked(seeder.run());
+  ModelBuilder builder(tree, options, progress);
+  return checked(builder.run());
 }
 
 Result<BuiltModel> build_with_room(SmoothedTree tree, const BuildOptions& options,
                                    const Progress& progress) {
   if (const auto error = without_branches(tree)) return fail(*error);
   RoomMaker room(tree);
+  const auto cut = [&](const std::vector<PlannedNode>& nodes) {
+    bool any = false;
+    for (const PlannedNode& node : nodes) any = room.cut(node) || any;
+    if (any) tree = room.tree();
+    return any;
+  };
+
+  // A plan tells soon which junctions swallow too many others, so these are cut before anything is
+  // built; which of the others cannot be built is known only afterwards.
   BuiltByName known;
   int builds = 0;
   for (int round = 0;; ++round) {
     if (progress.should_stop()) return fail(cancelled("plan"));
     progress.at("plan", 0.0);
-    Seeder seeder(tree, options, progress);
-    const bool may_cut = round < kRoomRounds && builds < kRoomBuilds;
-    const auto cut = [&](const std::vector<PlannedNode>& nodes) {
-      bool any = false;
-      for (const PlannedNode& node : nodes) any = room.cut(node) || any;
-      if (any) tree = room.tree();
-      return any;
-    };
-    if (may_cut && cut(seeder.crowded())) continue;
+    ModelBuilder builder(tree, options, progress);
+    const bool may_cut = round < RetryRules::kRoomRounds && builds < RetryRules::kRoomBuilds;
+    if (may_cut && cut(builder.crowded())) continue;
+
     ++builds;
-    seeder.reuse(std::move(known));
-    Result<Model> model = checked(seeder.run());
+    builder.reuse(std::move(known));
+    Result<Model> model = checked(builder.run());
     if (!model) return fail(model.error());
-    if (may_cut && cut(seeder.failed())) {
-      known = seeder.built();
+    if (may_cut && cut(builder.failed())) {
+      known = builder.built();
       continue;
     }
     return BuiltModel{*std::move(model), std::move(tree)};

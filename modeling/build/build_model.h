@@ -33,12 +33,12 @@ struct BuildOptions {
 // that cannot be built is listed in Model::failed and the network closes around it. Errors: nothing
 // at all could be built; stopped on request.
 Result<Model> build_model(const CenterlineTree& tree, const BuildOptions& options = {},
-                         const Progress& progress = {});
+                          const Progress& progress = {});
 
 // The first half of it: the tree rounded to what no unit of length changes
-// (modeling/tree/unit_rounding.h), smoothed and, if asked for, kept apart.
+// (modeling/tree/clean_tree.h), smoothed and, if asked for, kept apart.
 Result<SmoothedTree> smooth_for_build(const CenterlineTree& tree, const BuildOptions& options = {},
-                                     const Progress& progress = {});
+                                      const Progress& progress = {});
 
 // A model and the smoothed tree it is true to: the one it was made of, thinned where there was no
 // room (modeling/build/make_room.h).
@@ -50,10 +50,10 @@ struct BuiltModel {
 // The second half: from a tree that is smooth already. Junctions that swallow each other or that
 // cannot be built for being several in one are cut, and vessels thinned there; warnings name them.
 Result<BuiltModel> build_with_room(SmoothedTree tree, const BuildOptions& options = {},
-                              const Progress& progress = {});
+                                   const Progress& progress = {});
 
 // The same with every vessel as thick as it is.
 Result<Model> build_smoothed(const SmoothedTree& tree, const BuildOptions& options = {},
-                            const Progress& progress = {});
+                             const Progress& progress = {});
 
 }  // namespace angiospline

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "modeling/build/rules.h"
+
 namespace angiospline {
 namespace {
-
-constexpr int kFewSettings = 3;  // of a junction inside which branches bend
 
 // The same with all branches taken for rays from the centre to where they are wanted.
 JunctionSpec centered(const PlannedNode& node) {
@@ -39,7 +39,7 @@ BuiltJunction build_bent_junction(const PlannedNode& node, JunctionOptions optio
                                   const Progress& progress) {
   BuiltJunction built{node.spec, {}, node.error};
   if (node.error) return built;
-  options.settings = std::min(options.settings, kFewSettings);
+  options.settings = std::min(options.settings, RetryRules::kFewSettings);
   Result<Junction> junction = make_junction(node.spec, options, progress);
   if (!junction) {
     built.error = junction.error();
@@ -56,11 +56,15 @@ BuiltJunction build_junction(const PlannedNode& node, const JunctionOptions& opt
   const bool is_centered =
       std::all_of(node.spec.branches.begin(), node.spec.branches.end(),
                   [](const JunctionBranch& b) { return b.offset_mm.isZero(0); });
+
+  // First as if all branches met in the centre; then as planned, and if that was the same already,
+  // with openings farther out.
   struct Try {
     bool as_planned;
     double margin;
   };
-  for (const Try& next : {Try{is_centered, 1.0}, Try{true, is_centered ? 1.6 : 1.0}}) {
+  const double wider = is_centered ? RetryRules::kWiderMargin : 1.0;
+  for (const Try& next : {Try{is_centered, 1.0}, Try{true, wider}}) {
     JunctionOptions tried = options;
     tried.margin *= next.margin;
     Result<Junction> junction =

@@ -11,17 +11,11 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
-#include "modeling/tree/path_knots.h"
+#include "modeling/build/rules.h"
+#include "modeling/tree/keep_apart.h"
 
 namespace angiospline {
 namespace {
-
-constexpr double kFullRadii = 2.0;   // along the tree from a node on, thinned by all of its share
-constexpr double kFadeRadii = 3.0;   // and from there on less and less
-constexpr double kMostAtOnce = 0.8;  // what one cut leaves at least: it changes the whole plan
-constexpr double kSpare = 0.97;      // of the length that is lacking
-constexpr double kWorthNaming = 1e-3;
-constexpr int kPlacesPerRadius = 2;  // at which the way along a branch is measured
 
 // 1 up to 0, 0 from 1 on, with two smooth derivatives.
 double fading(double x) {
@@ -61,12 +55,14 @@ class Parts {
 
 RoomMaker::RoomMaker(SmoothedTree tree, const RoomOptions& options)
     : given_(std::move(tree)), options_(options), at_(branches_at_nodes(given_.tree)) {
+  // The way along a branch is the integral of ds over the radius there, by the midpoint rule.
   shares_.assign(at_.size(), 1.0);
   requests_.resize(at_.size());
   for (const BSplineCurve<4>& path : given_.paths) {
     const double length = path.knots().last();
     const double mean = path.control_points().row(3).mean();
-    const int count = std::max(8, static_cast<int>(kPlacesPerRadius * length / mean));
+    const int count = std::max(ThinningRules::kFewestPlaces,
+                               static_cast<int>(ThinningRules::kPlacesPerRadius * length / mean));
     std::vector<double> way{0.0};
     for (int k = 0; k < count; ++k) {
       way.push_back(way.back() + length / count / path.at(length * (k + 0.5) / count)(3));
@@ -81,20 +77,23 @@ bool RoomMaker::cut(const PlannedNode& node) {
   std::stable_sort(
       absorbed.begin(), absorbed.end(),
       [](const AbsorbedBranch& a, const AbsorbedBranch& b) { return a.fits < b.fits; });
+
   // Those that lack the most stay together first.
   Parts parts(at_);
   std::vector<std::pair<int, double>> asked;
   for (const AbsorbedBranch& between : absorbed) {
     const CenterlineBranch& branch = given_.tree.branches[index(between.branch)];
     if (!is_small && parts.join(branch.from, branch.to, options_.most_branches)) continue;
-    const double factor = std::clamp(kSpare * between.fits, kMostAtOnce, kSpare);
+    const double factor = std::clamp(ThinningRules::kSpare * between.fits,
+                                     ThinningRules::kMostAtOnce, ThinningRules::kSpare);
     for (const int n : {branch.from, branch.to}) {
       asked.emplace_back(n, std::max(options_.thinnest, factor * shares_[index(n)]));
     }
   }
+
   bool thinner = false;
   for (const auto& [n, share] : asked) {
-    if (share >= shares_[index(n)] - kWorthNaming) continue;
+    if (share >= shares_[index(n)] - ThinningRules::kWorthNaming) continue;
     thinner = true;
     shares_[index(n)] = share;
   }
@@ -103,6 +102,7 @@ bool RoomMaker::cut(const PlannedNode& node) {
 
 // The nodes that are less than the reach of thinning away from this one, in local radii of way.
 std::vector<std::pair<int, double>> RoomMaker::near(int node) const {
+  // Dijkstra's algorithm, stopped at the reach.
   std::vector<std::pair<int, double>> found;
   using Entry = std::pair<double, int>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
@@ -113,10 +113,11 @@ std::vector<std::pair<int, double>> RoomMaker::near(int node) const {
     const auto is_same = [m = n](const auto& entry) { return entry.first == m; };
     if (std::any_of(found.begin(), found.end(), is_same)) continue;
     found.emplace_back(n, away);
+
     for (const int b : at_[index(n)]) {
       const CenterlineBranch& branch = given_.tree.branches[index(b)];
       const double there = away + ways_[index(b)].back();
-      if (there < kFullRadii + kFadeRadii) {
+      if (there < ThinningRules::kFullRadii + ThinningRules::kFadeRadii) {
         open.emplace(there, branch.from == n ? branch.to : branch.from);
       }
     }
@@ -132,10 +133,12 @@ double RoomMaker::share_at(std::size_t b, double along) const {
   const double x = std::clamp(along / length, 0.0, 1.0) * static_cast<double>(ways.size() - 1);
   const auto k = std::min(static_cast<std::size_t>(x), ways.size() - 2);
   const double way = ways[k] + (x - static_cast<double>(k)) * (ways[k + 1] - ways[k]);
+
   double least = 1;
   for (const auto& [node, gone] : {std::pair{branch.from, way}, {branch.to, ways.back() - way}}) {
     for (const Request& request : requests_[index(node)]) {
-      const double weight = fading((request.away + gone - kFullRadii) / kFadeRadii);
+      const double weight =
+          fading((request.away + gone - ThinningRules::kFullRadii) / ThinningRules::kFadeRadii);
       least = std::min(least, 1 - weight * (1 - request.share));
     }
   }
@@ -151,8 +154,9 @@ void RoomMaker::thin(std::size_t b, SmoothedTree& tree) const {
     points(3, i) *= share;
     kept = std::min(kept, share);
   }
-  if (kept > 1 - kWorthNaming) return;
+  if (kept > 1 - ThinningRules::kWorthNaming) return;
   tree.paths[b] = BSplineCurve<4>(fine.knots(), std::move(points));
+
   // The tree's own radii too, so that what is smoothed again is as thin.
   CenterlineBranch& branch = tree.tree.branches[b];
   const double scale = fine.knots().last() / length_mm(branch);
@@ -161,6 +165,7 @@ void RoomMaker::thin(std::size_t b, SmoothedTree& tree) const {
     if (i > 0) along += (branch.points_mm.col(i) - branch.points_mm.col(i - 1)).norm();
     branch.radii_mm(i) *= share_at(b, scale * along);
   }
+
   tree.warnings.push_back(
       {WarningCode::kThinnedForJunctions,
        fmt::format("branch {} was thinned to {:.0f} % so that the junctions near it have room",
@@ -175,6 +180,7 @@ SmoothedTree RoomMaker::tree() {
       requests_[index(node)].push_back({shares_[n], away});
     }
   }
+
   SmoothedTree tree = given_;
   for (std::size_t b = 0; b < tree.paths.size(); ++b) {
     const CenterlineBranch& branch = tree.tree.branches[b];

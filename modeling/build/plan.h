@@ -1,6 +1,7 @@
 // Which junctions and bodies a smoothed tree becomes, and where the ones end and the others begin.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ namespace angiospline {
 struct BranchEnd {
   int branch = -1;
   bool at_end = false;
+
+  BranchEnd opposite() const { return {branch, !at_end}; }
 };
 
 // A branch as the plan sees it: samples of its smoothed path. A branch that has left the plan (it
@@ -31,6 +34,10 @@ struct PlannedBranch {
 
   double length_mm() const { return along_mm.back(); }
   Vec4 at(double along) const;  // linear between samples, held beyond the ends
+  // The place `along` from one of its ends.
+  Vec4 at_from(BranchEnd end, double along) const {
+    return at(end.at_end ? length_mm() - along : along);
+  }
   // Arc length, counted from `end`, of the place nearest to `center`, if the path begins away from
   // it and passes it: no farther on than three times its distance.
   double along_nearest(BranchEnd end, const Vec3& center) const;
@@ -39,6 +46,9 @@ struct PlannedBranch {
   std::optional<double> along_at_distance(BranchEnd end, const Vec3& center,
                                           double distance_mm) const;
 };
+
+// Sets along_mm from the samples.
+void measure_length(PlannedBranch& branch);
 
 // A branch that became part of a junction, and the share of the length it needed that it had; 0 if
 // it was not for its length.
@@ -71,6 +81,8 @@ struct PlannedNode {
                                    // opening, on its path; 0: in the centre
   bool relieved = false;  // its centre and distances were chosen by what they ask of bodies
 
+  // Where the body of this slot begins to follow its path.
+  double follows_mm(std::size_t slot) const { return std::max(wanted_mm[slot], meets_mm[slot]); }
   // What was found for the branches that end here, when these are others.
   void forget_openings() {
     caps_mm.clear();
@@ -81,80 +93,32 @@ struct PlannedNode {
   bool is_junction() const { return alive && ends.size() >= 3; }
 };
 
-// The plan keeps its own laws: every live branch has room for the openings at both its ends and a
-// body between them; no node has exactly two ends of different branches.
-class Plan {
- public:
-  // Merges, drops and extends until every branch has room. Parallel over nodes, linear in the tree.
-  Plan(const SmoothedTree& tree, const JunctionOptions& options);
+// A plan is a value; the steps that make and change it are functions of their own headers:
+// modeling/build/plan_measures.h (openings), plan_relief.h (what they ask of bodies), plan_room.h
+// (the length of branches), plan_edits.h (merging, dropping, extending), plan_settling.h (all of
+// these until nothing is left to do) and plan_bends.h (branches that bend inside junctions).
+// Laws of a settled plan: every live branch has room for the openings at both its ends and a body
+// between them; no node has exactly two ends of different branches.
+struct Plan {
+  JunctionOptions options;
+  std::vector<PlannedNode> nodes;
+  std::vector<PlannedBranch> branches;
+  std::vector<char> dirty;  // nodes to measure again
+  std::vector<Warning> warnings;
+  std::vector<std::vector<PlannedNode>> bends;  // other ways to plan each node, the best first
 
-  const std::vector<PlannedNode>& nodes() const { return nodes_; }
-  const std::vector<PlannedBranch>& branches() const { return branches_; }
-  const std::vector<Warning>& warnings() const { return warnings_; }
-
-  // After a junction failed: look for directions farther out, or merge it with the nearest junction
-  // no farther than `radii` of the branch between them. False if there is none. Then settle()
-  // again.
-  void reach_farther(int node, double factor);
-  void move_forward(int node, double radii);
-  bool merge_with_nearest(int node, double radii);
-  // After a body folded: its two junctions become one. False if it has not two.
-  bool merge_along(int branch);
-  void settle();
-
-  // Where openings still strain the bodies behind them, branches may bend inside their junctions:
-  // their rays begin on their paths. find_bends() looks for ways to do so, at most kAlternatives a
-  // node, the best first. bend() takes of each node the first that is not refused and leaves every
-  // branch its room; `refused` (one entry a node): so many of its ways are not to be taken. It
-  // returns the nodes that have changed, and is asked once only: again of a copy made before.
-  static constexpr int kAlternatives = 4;
-  void find_bends();
-  std::vector<int> bend(const std::vector<int>& refused);
-
- private:
-  struct Room;
-  // In plan_bends.cpp.
-  struct Eased;
-  double cost_at(const PlannedNode& node, std::size_t slot) const;
-  std::vector<double> costs_of(const PlannedNode& node) const;
-  void ease(Eased best, std::vector<Eased>& found) const;
-  std::vector<PlannedNode> eased(const PlannedNode& node) const;
-  // In plan_measures.cpp.
-  void measure(PlannedNode& node) const;
-  void aim(PlannedNode& node, const std::vector<double>& distance_mm) const;
-  bool find_distances(PlannedNode& node, std::vector<double>& distance_mm) const;
-  double bend_behind(const PlannedNode& node, std::size_t slot, double along) const;
-  double strain_at(const PlannedNode& node, std::size_t slot) const;
-  double overlap_behind(const PlannedNode& node, std::size_t i, std::size_t j) const;
-  double strain_of(const PlannedNode& node) const;
-  void relieve(PlannedNode& node) const;
-  std::vector<Vec3> other_centres(const PlannedNode& node) const;
-  Room room_of(int branch) const;
-  bool has_room(int branch) const;
-  double end_along(int branch, bool at_end, bool wanted) const;
-  double planned_mm(BranchEnd end) const;
-  double bend_of(int branch) const;
-  bool share_room(int branch);
-  bool tighten();
-  bool drop_twins(int node);
-  bool drop_inner_loop(int node);
-  void extend(int branch, double missing_mm);
-  void drop(int branch, const std::string& why);
-  void merge(int branch, double fits, const std::string& why);
-  bool straighten(int branch, const Room& room, double bend);
-  void make_room(int branch, const Room& room);
-  void join_through(int node);
-  void detach(BranchEnd end);
-  PlannedNode& node_at(BranchEnd end);
-  const PlannedNode& node_at(BranchEnd end) const;
-  int slot_of(BranchEnd end) const;
-
-  JunctionOptions options_;
-  std::vector<PlannedNode> nodes_;
-  std::vector<PlannedBranch> branches_;
-  std::vector<std::vector<PlannedNode>> bends_;  // other ways to plan each node
-  std::vector<char> dirty_;                      // nodes to measure again
-  std::vector<Warning> warnings_;
+  const PlannedBranch& branch(BranchEnd end) const;
+  PlannedNode& node(BranchEnd end);
+  const PlannedNode& node(BranchEnd end) const;
+  std::size_t slot(BranchEnd end) const;  // of its node. Requires that the branch ends there
 };
+
+// The plan before anything is measured: nodes and branches as the tree has them, all of them dirty.
+// Linear in the tree, parallel over branches.
+Plan unsettled_plan(const SmoothedTree& tree, const JunctionOptions& options);
+
+// The settled plan: merges, drops and extends until every branch has room. Parallel over nodes,
+// linear in the tree.
+Plan make_plan(const SmoothedTree& tree, const JunctionOptions& options);
 
 }  // namespace angiospline

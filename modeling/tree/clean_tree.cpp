@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -9,29 +10,18 @@
 
 #include "base/disjoint_sets.h"
 #include "base/index.h"
+#include "modeling/tree/rules.h"
 
 namespace angiospline {
 namespace {
-
-// Points closer than this, in local radii, are one point: below any quantisation, above rounding.
-constexpr double kSamePoint = 1e-6;
-
-// Points of which so many may have been traced in the wrong order, within so many radii of way; and
-// by how much the right order must shorten it.
-constexpr Eigen::Index kMostReversed = 4;
-constexpr double kReversedWay = 6.0;
-constexpr double kWorthReversing = 0.97;
-constexpr int kReversalPasses = 4;
-
-// Spurs that appear when others go are looked for this often; what then remains stays.
-constexpr int kSpurPasses = 8;
 
 void drop_repeated_points(CenterlineBranch& branch) {
   const Eigen::Index count = branch.points_mm.cols();
   Eigen::Index kept = 1;
   for (Eigen::Index i = 1; i < count; ++i) {
     const double step = (branch.points_mm.col(i) - branch.points_mm.col(kept - 1)).norm();
-    const double same = kSamePoint * std::min(branch.radii_mm(i), branch.radii_mm(kept - 1));
+    const double same =
+        CleaningRules::kSamePoint * std::min(branch.radii_mm(i), branch.radii_mm(kept - 1));
     if (step <= same) {
       if (i + 1 < count) continue;
       if (kept > 1) --kept;  // the last point is the node's: it replaces its copy
@@ -53,18 +43,20 @@ int put_in_order(CenterlineBranch& branch) {
     return (p.col(i) - p.col(i - 1)).dot(p.col(i + 1) - p.col(i)) < 0;
   };
   const auto step = [&](Eigen::Index i, Eigen::Index j) { return (p.col(j) - p.col(i)).norm(); };
+
   int reversed = 0;
-  for (int pass = 0; pass < kReversalPasses; ++pass) {
+  for (int pass = 0; pass < CleaningRules::kReversalPasses; ++pass) {
     const int before = reversed;
     for (Eigen::Index i = 1; i + 2 < count; ++i) {
       if (!turns_back(i)) continue;
       double way = 0;
-      for (Eigen::Index j = i + 1; j < std::min(i + kMostReversed, count - 1); ++j) {
+      for (Eigen::Index j = i + 1; j < std::min(i + CleaningRules::kMostReversed, count - 1); ++j) {
         way += step(j - 1, j);
-        if (way > kReversedWay * branch.radii_mm(i)) break;
+        if (way > CleaningRules::kReversedWay * branch.radii_mm(i)) break;
         const double now = step(i - 1, i) + step(j, j + 1);
         const double then = step(i - 1, j) + step(i, j + 1);
-        if (!turns_back(j) || then + way >= kWorthReversing * (now + way)) continue;
+        if (!turns_back(j) || then + way >= CleaningRules::kWorthReversing * (now + way)) continue;
+
         const Eigen::Index width = j - i + 1;
         p.middleCols(i, width) = p.middleCols(i, width).rowwise().reverse().eval();
         branch.radii_mm.segment(i, width) = branch.radii_mm.segment(i, width).reverse().eval();
@@ -91,6 +83,8 @@ bool inside_lumen(const Vec3& p, const CenterlineBranch& branch, bool from_start
   for (Eigen::Index k = 0; k + 1 < count && walked <= reach; ++k) {
     const Eigen::Index i = from_start ? k : count - 1 - k;
     const Eigen::Index j = from_start ? k + 1 : count - 2 - k;
+
+    // The radius is linear along a segment, as the tube is.
     const Vec3 a = branch.points_mm.col(i);
     const Vec3 d = branch.points_mm.col(j) - a;
     const double length = d.norm();
@@ -103,16 +97,34 @@ bool inside_lumen(const Vec3& p, const CenterlineBranch& branch, bool from_start
   return false;
 }
 
+// ---------------------------------------------------------------- rounding
+
+// The step to which a number of this size is rounded.
+double step_of(double length) {
+  return std::ldexp(1.0, std::ilogb(length * CleaningRules::kOffRoundLengths) - kKeptBits);
+}
+
+double to_step(double value, double step) {
+  const double rounded = std::nearbyint(value / step) * step;
+  return std::isfinite(rounded) ? rounded : value;
+}
+
+// ---------------------------------------------------------------- cleaning
+
 class Cleaner {
  public:
   explicit Cleaner(const CenterlineTree& tree) : tree_(tree), alive_(tree.branches.size(), true) {}
 
   CleanedTree clean() {
+    // What has no radius or length first: all that follows measures by them.
     leave_out_branches_without_radius();
     for (CenterlineBranch& branch : tree_.branches) drop_repeated_points(branch);
     contract_branches_without_length();
+
+    // A spur that goes may leave a chain, and a chain that was joined may be a spur.
     join_chains();
-    for (int pass = 0; pass < kSpurPasses && drop_spurs(); ++pass) join_chains();
+    for (int pass = 0; pass < CleaningRules::kSpurPasses && drop_spurs(); ++pass) join_chains();
+
     for (CenterlineBranch& branch : tree_.branches) {
       if (const int points = put_in_order(branch); points > 0) {
         warnings_.push_back(
@@ -166,13 +178,14 @@ class Cleaner {
       const bool has_length = branch.points_mm.cols() > 2 ||
                               (branch.points_mm.cols() == 2 &&
                                (branch.points_mm.col(1) - branch.points_mm.col(0)).norm() >
-                                   kSamePoint * branch.radii_mm.minCoeff());
+                                   CleaningRules::kSamePoint * branch.radii_mm.minCoeff());
       if (has_length) continue;
       alive_[b] = false;
       nodes.join(branch.from, branch.to);
       warnings_.push_back({WarningCode::kBranchWithoutLength,
                            fmt::format("branch {} has no length: dropped", branch.name)});
     }
+
     for (CenterlineBranch& branch : tree_.branches) {
       branch.from = nodes.root(branch.from);
       branch.to = nodes.root(branch.to);
@@ -192,6 +205,8 @@ class Cleaner {
         spurs.emplace_back(length_mm(tree_.branches[b]), static_cast<int>(b));
       }
     }
+
+    // The shortest first: where it goes a longer one may be needed to make a junction.
     std::sort(spurs.begin(), spurs.end());
     bool dropped = false;
     for (const auto& [length, b] : spurs) {
@@ -236,6 +251,8 @@ class Cleaner {
     for (std::size_t n = 0; n < tree_.nodes.size(); ++n) {
       if (!at[n].empty() && at[n].size() != 2) keep_node(static_cast<int>(n), out);
     }
+
+    // Chains that begin at a node, those against their direction last; then rings.
     std::vector<bool> done(tree_.branches.size(), false);
     for (std::size_t b = 0; b < tree_.branches.size(); ++b) {
       if (!alive_[b] || done[b] || new_node_[index(tree_.branches[b].from)] < 0) continue;
@@ -245,11 +262,12 @@ class Cleaner {
       if (!alive_[b] || done[b] || new_node_[index(tree_.branches[b].to)] < 0) continue;
       walk(static_cast<int>(b), false, at, done, out);
     }
-    for (std::size_t b = 0; b < tree_.branches.size(); ++b) {  // rings
+    for (std::size_t b = 0; b < tree_.branches.size(); ++b) {
       if (!alive_[b] || done[b]) continue;
       keep_node(tree_.branches[b].from, out);
       walk(static_cast<int>(b), true, at, done, out);
     }
+
     replace_inlets(out);
     tree_ = std::move(out);
     alive_.assign(tree_.branches.size(), true);
@@ -278,6 +296,9 @@ class Cleaner {
       const auto& two = at[index(here)];
       b = two[0] == b ? two[1] : two[0];
     }
+
+    // It runs the way most of its parts do, and bears the names of its new ends if it is more than
+    // one and nobody else does.
     CenterlineBranch joined = joined_branch(chain);
     joined.from = new_node_[index(start)];
     joined.to = new_node_[index(here)];
@@ -298,6 +319,8 @@ class Cleaner {
     CenterlineBranch joined;
     joined.points_mm.resize(3, count);
     joined.radii_mm.resize(count);
+
+    // Parts share the point between them.
     Eigen::Index filled = 0;
     for (const auto& [b, along] : chain) {
       const CenterlineBranch& part = tree_.branches[index(b)];
@@ -322,6 +345,8 @@ class Cleaner {
       inlets.insert(n);
       has_inlet[index(component[index(n)])] = true;
     }
+
+    // Components that lost theirs get the widest end, but only in a tree that had inlets at all.
     if (!tree_.inlets.empty()) {
       std::vector<std::pair<double, int>> widest(out.nodes.size(), {0.0, -1});
       for (std::size_t n = 0; n < out.nodes.size(); ++n) {
@@ -349,5 +374,29 @@ class Cleaner {
 }  // namespace
 
 CleanedTree clean_tree(const CenterlineTree& tree) { return Cleaner(tree).clean(); }
+
+CenterlineTree rounded(CenterlineTree tree) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high = -low;
+  for (const CenterlineBranch& branch : tree.branches) {
+    low = low.cwiseMin(branch.points_mm.rowwise().minCoeff());
+    high = high.cwiseMax(branch.points_mm.rowwise().maxCoeff());
+  }
+
+  const double extent = (high - low).maxCoeff();
+  if (!(extent > 0) || !std::isfinite(extent)) return tree;
+  const double step = step_of(extent);
+
+  // Coordinates to one grid, radii each to its own digits: a small radius keeps as many.
+  const auto on_grid = [step](double x) { return to_step(x, step); };
+  for (CenterlineNode& node : tree.nodes) node.position_mm = node.position_mm.unaryExpr(on_grid);
+  for (CenterlineBranch& branch : tree.branches) {
+    branch.points_mm = branch.points_mm.unaryExpr(on_grid).eval();
+    for (double& radius : branch.radii_mm) {
+      if (radius > 0 && std::isfinite(radius)) radius = to_step(radius, step_of(radius));
+    }
+  }
+  return tree;
+}
 
 }  // namespace angiospline

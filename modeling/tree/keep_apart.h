@@ -1,6 +1,7 @@
 // Vessels that run into each other, moved apart and, where that is not enough, thinned.
 #pragma once
 
+#include "kernel/spline/curve.h"
 #include "modeling/tree/smooth_centerlines.h"
 
 namespace angiospline {
@@ -18,5 +19,9 @@ struct KeepApartOptions {
 // that was moved or thinned, by how much, and each pair that still is too near. Paths that touch
 // nothing are unchanged. O(rounds x tree).
 SmoothedTree keep_apart(SmoothedTree tree, const KeepApartOptions& options = {});
+
+// The same path (x, y, z and radius over its length) with a knot at least every mean radius: a
+// straight one may have a handful of control points, too few to move or thin a part of it.
+BSplineCurve<4> with_knots_each_radius(const BSplineCurve<4>& path);
 
 }  // namespace angiospline

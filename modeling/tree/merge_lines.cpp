@@ -9,6 +9,7 @@
 
 #include "base/contract.h"
 #include "base/index.h"
+#include "modeling/tree/rules.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
 // g++ follows nanoflann's empty trees into their bounding boxes, which are not used then.
@@ -17,9 +18,6 @@
 
 namespace angiospline {
 namespace {
-
-constexpr int kMostBetween = 64;        // points put between two of a line
-constexpr std::size_t kNeighbours = 6;  // nearest points whose edges are looked at
 
 // The points of a graph as nanoflann reads them.
 struct GraphPoints {
@@ -62,19 +60,19 @@ class NearestOfOthers {
     squared_.fill(std::numeric_limits<double>::infinity());
   }
   std::size_t size() const { return size_; }
-  bool full() const { return size_ == kNeighbours; }
+  bool full() const { return size_ == CleaningRules::kNeighbours; }
   double worstDist() const { return squared_.back(); }  // NOLINT(readability-identifier-naming)
   bool addPoint(double squared, std::size_t point) {    // NOLINT(readability-identifier-naming)
     if (not_line_ >= 0 && line_of_[point] == not_line_) return true;
     if (squared >= squared_.back()) return true;
-    std::size_t k = std::min(size_, kNeighbours - 1);
+    std::size_t k = std::min(size_, CleaningRules::kNeighbours - 1);
     for (; k > 0 && squared_[k - 1] > squared; --k) {
       squared_[k] = squared_[k - 1];
       points_[k] = points_[k - 1];
     }
     squared_[k] = squared;
     points_[k] = static_cast<int>(point);
-    size_ = std::min(size_ + 1, kNeighbours);
+    size_ = std::min(size_ + 1, CleaningRules::kNeighbours);
     return true;
   }
   int point(std::size_t k) const { return points_[k]; }
@@ -83,8 +81,8 @@ class NearestOfOthers {
   const std::vector<int>& line_of_;
   int not_line_;
   std::size_t size_ = 0;
-  std::array<double, kNeighbours> squared_{};
-  std::array<int, kNeighbours> points_{};
+  std::array<double, CleaningRules::kNeighbours> squared_{};
+  std::array<int, CleaningRules::kNeighbours> points_{};
 };
 
 double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
@@ -103,8 +101,8 @@ CenterlineLine densified(const CenterlineLine& line) {
       const Vec3 a = line.points_mm.col(i - 1);
       const Vec3 b = line.points_mm.col(i);
       const double r = std::min(line.radii_mm(i - 1), line.radii_mm(i));
-      const int parts = static_cast<int>(
-          std::clamp(std::ceil((b - a).norm() / r), 1.0, static_cast<double>(kMostBetween)));
+      const int parts = static_cast<int>(std::clamp(
+          std::ceil((b - a).norm() / r), 1.0, static_cast<double>(CleaningRules::kMostBetween)));
       for (int k = 1; k < parts; ++k) {
         const double t = static_cast<double>(k) / parts;
         points.emplace_back((1 - t) * a + t * b);
@@ -114,6 +112,7 @@ CenterlineLine densified(const CenterlineLine& line) {
     points.emplace_back(line.points_mm.col(i));
     radii.push_back(line.radii_mm(i));
   }
+
   CenterlineLine dense{
       line.name, Points3(3, static_cast<Eigen::Index>(points.size())),
       Eigen::Map<Eigen::VectorXd>(radii.data(), static_cast<Eigen::Index>(radii.size()))};
@@ -141,6 +140,9 @@ class LineMerger {
     if (merged_.graph.points.empty()) return best;
     NearestOfOthers found(line_of_, not_line);
     tree_.findNeighbors(found, p.data(), nanoflann::SearchParams());
+
+    // The nearest place lies on an edge of one of the nearest points, as these are a radius apart
+    // at most.
     for (std::size_t k = 0; k < found.size(); ++k) {
       const GraphPoint& point = merged_.graph.points[index(found.point(k))];
       best.distance = std::min(best.distance, (p - point.position_mm).norm());
@@ -164,6 +166,7 @@ class LineMerger {
     neighbours_[index(b)].push_back(a);
   }
 
+  // Of a line, what departs from those before it.
   void add(const CenterlineLine& line) {
     const Eigen::Index count = line.points_mm.cols();
     std::vector<Nearest> places(index(static_cast<int>(count)));
@@ -178,9 +181,24 @@ class LineMerger {
       any_shared = any_shared || is_shared;
     }
     if (any_shared) tidy(line, places, shared);
+
     merged_.graph.line_names.push_back(line.name);
     merged_.overlapping += std::count(shared.begin(), shared.end(), true) > 0;
     const std::size_t first = merged_.graph.points.size();
+    append(line, places, shared);
+
+    const std::size_t last = merged_.graph.points.size();
+    if (last == first) {
+      ++merged_.dropped;
+    } else {
+      tree_.addPoints(first, last - 1);
+    }
+  }
+
+  // New points for those that are not shared, and an edge to each from the one before, unless both
+  // lie on what is there.
+  void append(const CenterlineLine& line, const std::vector<Nearest>& places,
+              const std::vector<bool>& shared) {
     int before = -1;
     for (std::size_t i = 0; i < places.size(); ++i) {
       int here = places[i].point;
@@ -196,12 +214,6 @@ class LineMerger {
       if (before >= 0 && !(shared[i] && was_shared)) connect(before, here);
       before = here;
     }
-    const std::size_t last = merged_.graph.points.size();
-    if (last == first) {
-      ++merged_.dropped;
-    } else {
-      tree_.addPoints(first, last - 1);
-    }
   }
 
   // Takes back departures that stay close and encounters in passing.
@@ -216,6 +228,8 @@ class LineMerger {
         i = end;
       }
     };
+
+    // A departure that comes back without ever going far is none.
     for_each_run(false, [&](std::size_t i, std::size_t end) {
       if (i == 0 || end == count) return;
       for (std::size_t k = i; k < end; ++k) {
@@ -225,6 +239,8 @@ class LineMerger {
       std::fill(shared.begin() + static_cast<std::ptrdiff_t>(i),
                 shared.begin() + static_cast<std::ptrdiff_t>(end), true);
     });
+
+    // Nor is a touch shorter than a radius a junction.
     for_each_run(true, [&](std::size_t i, std::size_t end) {
       if (i == 0 || end == count) return;
       const Vec3 a = line.points_mm.col(static_cast<Eigen::Index>(i));

@@ -12,15 +12,10 @@
 
 #include "base/disjoint_sets.h"
 #include "base/index.h"
+#include "modeling/tree/rules.h"
 
 namespace angiospline {
 namespace {
-
-constexpr double kCapsuleRadii = 0.5;  // length of a capsule
-constexpr int kMostCapsules = 4096;    // of one branch: a hair is cut more coarsely
-constexpr double kReturnRadii = 6.0;   // of way between two places that may overlap
-constexpr double kBackRadii = 2.5;     // of way back to a junction that was left
-constexpr double kShortBranch = 2.0;   // in radii of its junctions: these then are one
 
 struct Capsule {
   Vec3 a;
@@ -40,10 +35,14 @@ std::pair<Vec3, Vec3> nearest_points(const Capsule& p, const Capsule& q) {
   const double e = d2.squaredNorm();
   const double f = d2.dot(r);
   if (!(a > 0) || !(e > 0)) return {p.a, q.a};  // paths have no still points
+
+  // The nearest points of the two lines, the first held within its segment (Ericson, p. 149)...
   const double c = d1.dot(r);
   const double b = d1.dot(d2);
   const double denominator = a * e - b * b;
   double s = denominator > 0 ? std::clamp((b * f - c * e) / denominator, 0.0, 1.0) : 0.0;
+
+  // ... and where the second then lies beyond its own, the first's nearest to that end.
   double t = (b * s + f) / e;
   if (t < 0) {
     t = 0;
@@ -86,6 +85,7 @@ class OctaveGrids {
     const Capsule& own = capsules_[index(i)];
     const int own_octave = octave_of(own);
     for (auto grid = grids_.lower_bound(own_octave); grid != grids_.end(); ++grid) {
+      // Grids of larger octaves hold larger capsules only: each pair is met once, from the smaller.
       const Cell center = cell_of(middle(own), grid->first);
       for (std::int64_t dx = -1; dx <= 1; ++dx) {
         for (std::int64_t dy = -1; dy <= 1; ++dy) {
@@ -129,13 +129,16 @@ class OctaveGrids {
 std::vector<Capsule> capsules_of(const SmoothedTree& tree) {
   std::vector<Capsule> capsules;
   for (std::size_t b = 0; b < tree.paths.size(); ++b) {
+    // As long as the thinnest of five places asks.
     const BSplineCurve<4>& path = tree.paths[b];
     const double length = path.knots().last();
     double radius = path.at(0.0)(3);
     for (const double part : {0.25, 0.5, 0.75, 1.0})
       radius = std::min(radius, path.at(part * length)(3));
-    const int count = static_cast<int>(std::clamp(std::ceil(length / (kCapsuleRadii * radius)), 1.0,
-                                                  static_cast<double>(kMostCapsules)));
+    const int count =
+        static_cast<int>(std::clamp(std::ceil(length / (OverlapRules::kCapsuleRadii * radius)), 1.0,
+                                    static_cast<double>(OverlapRules::kMostCapsules)));
+
     Vec4 before = path.at(0.0);
     for (int k = 1; k <= count; ++k) {
       const Vec4 here = path.at(length * k / count);
@@ -157,11 +160,12 @@ std::vector<int> clusters(const SmoothedTree& tree) {
     width[index(branch.to)] = std::max(width[index(branch.to)], tree.paths[b].at(last)(3));
   }
 
+  // Branches that are no longer than their junctions are wide.
   DisjointSets joined(width.size());
   for (std::size_t b = 0; b < tree.paths.size(); ++b) {
     const CenterlineBranch& branch = tree.tree.branches[b];
     const double wide = width[index(branch.from)] + width[index(branch.to)];
-    if (tree.paths[b].knots().last() > kShortBranch * wide) continue;
+    if (tree.paths[b].knots().last() > OverlapRules::kShortBranch * wide) continue;
     joined.join(branch.from, branch.to);
   }
 
@@ -181,12 +185,16 @@ std::vector<bool> beyond_junction(const std::vector<Contact>& contacts, int Cont
                                   int count, bool at_start, bool at_end) {
   std::vector<bool> touched(index(count), false);
   for (const Contact& c : contacts) touched[index(c.*number)] = true;
+
   // One capsule without contact is within the accuracy of capsules; the node's own is always
   // passed.
   int first = 0;
-  while (at_start && first < count && (touched[index(first)] || first < 2)) ++first;
+  while (at_start && first < count && (touched[index(first)] || first < OverlapRules::kAccuracy))
+    ++first;
   int last = count;
-  while (at_end && last > first && (touched[index(last - 1)] || last > count - 2)) --last;
+  while (at_end && last > first &&
+         (touched[index(last - 1)] || last > count - OverlapRules::kAccuracy))
+    --last;
   std::vector<bool> beyond;
   for (const Contact& c : contacts) beyond.push_back(c.*number >= first && c.*number < last);
   return beyond;
@@ -207,12 +215,14 @@ std::vector<bool> hang_together(const std::vector<Contact>& contacts,
     reached[k] = true;
     front.push_back(k);
   }
+
+  // One capsule between two is within the accuracy of capsules.
+  constexpr int kNear = OverlapRules::kAccuracy;
   while (!front.empty()) {
     const Contact& from = contacts[front.back()];
     front.pop_back();
-    // One capsule between two is within the accuracy of capsules.
-    for (int a = from.number_a - 2; a <= from.number_a + 2; ++a) {
-      for (int b = from.number_b - 2; b <= from.number_b + 2; ++b) {
+    for (int a = from.number_a - kNear; a <= from.number_a + kNear; ++a) {
+      for (int b = from.number_b - kNear; b <= from.number_b + kNear; ++b) {
         const auto found = places.find({a, b});
         if (found == places.end() || reached[found->second]) continue;
         reached[found->second] = true;
@@ -242,6 +252,67 @@ double way_over_radii(const SmoothedTree& tree, const PathContact& c) {
   return way / (path_a.at(c.first_along)(3) + path_b.at(c.second_along)(3));
 }
 
+// All capsules of different vessels, or of one after some way, that are nearer than they may be: by
+// pairs of branches, the lower first.
+std::map<std::pair<int, int>, std::vector<Contact>> contacts_by_pair(
+    const std::vector<Capsule>& capsules, double clearance) {
+  const OctaveGrids grids(capsules, clearance);
+  std::map<std::pair<int, int>, std::vector<Contact>> contacts;
+  const auto along = [](const Capsule& c, const Vec3& at) {
+    return c.start_mm + (at - c.a).norm();
+  };
+  const auto compare = [&](const Capsule* p, const Capsule* q) {
+    if (std::pair(p->branch, p->number) > std::pair(q->branch, q->number)) std::swap(p, q);
+    const double sum = p->radius + q->radius;
+    const double way = q->start_mm - p->start_mm;
+    if (p->branch == q->branch && way < 0.5 * OverlapRules::kReturnRadii * sum) return;
+    const auto [u, v] = nearest_points(*p, *q);
+    const double depth = sum + clearance * std::min(p->radius, q->radius) - (u - v).norm();
+    if (depth <= 0) return;
+    contacts[{p->branch, q->branch}].push_back(
+        {p->number, q->number, {p->branch, q->branch, along(*p, u), along(*q, v), u, v, depth}});
+  };
+  for (std::size_t i = 0; i < capsules.size(); ++i) {
+    grids.for_larger(static_cast<int>(i),
+                     [&](int j) { compare(&capsules[i], &capsules[index(j)]); });
+  }
+  return contacts;
+}
+
+// What each contact of a pair of branches has to do with a junction of both.
+struct Standing {
+  std::vector<bool> beyond_first;   // behind the first gap along the first branch
+  std::vector<bool> beyond_second;  // and along the second
+  std::vector<bool> of_junction;    // hangs together with the junction's own
+};
+
+// `count`: capsules of the two branches.
+Standing standing_of(const SmoothedTree& tree, const std::vector<int>& cluster,
+                     const std::array<int, 2>& count, const std::vector<Contact>& found) {
+  const int first = found.front().vessels.first;
+  const int second = found.front().vessels.second;
+  const CenterlineBranch& a = tree.tree.branches[index(first)];
+  const CenterlineBranch& b = tree.tree.branches[index(second)];
+  const auto meets = [&](int node, const CenterlineBranch& other) {
+    return cluster[index(node)] == cluster[index(other.from)] ||
+           cluster[index(node)] == cluster[index(other.to)];
+  };
+
+  // A branch that comes back to itself has no junction with itself, unless it is a ring.
+  Standing standing;
+  if (first == second) {
+    standing.beyond_first.assign(found.size(), a.from != a.to);
+    standing.beyond_second = standing.beyond_first;
+  } else {
+    standing.beyond_first =
+        beyond_junction(found, &Contact::number_a, count[0], meets(a.from, b), meets(a.to, b));
+    standing.beyond_second =
+        beyond_junction(found, &Contact::number_b, count[1], meets(b.from, a), meets(b.to, a));
+  }
+  standing.of_junction = hang_together(found, standing.beyond_first, standing.beyond_second);
+  return standing;
+}
+
 }  // namespace
 
 std::vector<PathContact> find_path_contacts(const SmoothedTree& tree,
@@ -249,49 +320,17 @@ std::vector<PathContact> find_path_contacts(const SmoothedTree& tree,
   const std::vector<Capsule> capsules = capsules_of(tree);
   std::vector<int> count(tree.paths.size(), 0);
   for (const Capsule& c : capsules) ++count[index(c.branch)];
-  const OctaveGrids grids(capsules, options.clearance);
-  std::map<std::pair<int, int>, std::vector<Contact>> contacts;
-  for (std::size_t i = 0; i < capsules.size(); ++i) {
-    grids.for_larger(static_cast<int>(i), [&](int j) {
-      const Capsule* p = &capsules[i];
-      const Capsule* q = &capsules[index(j)];
-      if (std::pair(p->branch, p->number) > std::pair(q->branch, q->number)) std::swap(p, q);
-      const double sum = p->radius + q->radius;
-      if (p->branch == q->branch && q->start_mm - p->start_mm < 0.5 * kReturnRadii * sum) return;
-      const auto [u, v] = nearest_points(*p, *q);
-      const double depth =
-          sum + options.clearance * std::min(p->radius, q->radius) - (u - v).norm();
-      if (depth <= 0) return;
-      const auto along = [](const Capsule& c, const Vec3& at) {
-        return c.start_mm + (at - c.a).norm();
-      };
-      contacts[{p->branch, q->branch}].push_back(
-          {p->number, q->number, {p->branch, q->branch, along(*p, u), along(*q, v), u, v, depth}});
-    });
-  }
   const std::vector<int> cluster = clusters(tree);
+
   std::vector<PathContact> result;
-  for (const auto& [pair, found] : contacts) {
-    const CenterlineBranch& a = tree.tree.branches[index(pair.first)];
-    const CenterlineBranch& b = tree.tree.branches[index(pair.second)];
-    const auto meets = [&](int node, const CenterlineBranch& other) {
-      return cluster[index(node)] == cluster[index(other.from)] ||
-             cluster[index(node)] == cluster[index(other.to)];
-    };
-    const bool same = pair.first == pair.second;
-    const auto beyond_a = same
-                              ? std::vector<bool>(found.size(), a.from != a.to)
-                              : beyond_junction(found, &Contact::number_a, count[index(pair.first)],
-                                                meets(a.from, b), meets(a.to, b));
-    const auto beyond_b =
-        same ? beyond_a
-             : beyond_junction(found, &Contact::number_b, count[index(pair.second)],
-                               meets(b.from, a), meets(b.to, a));
-    const std::vector<bool> own = hang_together(found, beyond_a, beyond_b);
+  for (const auto& [pair, found] : contacts_by_pair(capsules, options.clearance)) {
+    const std::array<int, 2> counts{count[index(pair.first)], count[index(pair.second)]};
+    const Standing standing = standing_of(tree, cluster, counts, found);
     for (std::size_t k = 0; k < found.size(); ++k) {
       const PathContact& vessels = found[k].vessels;
-      const bool beyond_both = beyond_a[k] && beyond_b[k];
-      const bool comes_back = !own[k] && way_over_radii(tree, vessels) > 0.5 * kBackRadii;
+      const bool beyond_both = standing.beyond_first[k] && standing.beyond_second[k];
+      const bool comes_back = !standing.of_junction[k] &&
+                              way_over_radii(tree, vessels) > 0.5 * OverlapRules::kBackRadii;
       if (beyond_both || comes_back) result.push_back(vessels);
     }
   }

@@ -42,7 +42,7 @@ struct PathContact {
 
 // All pairs of capsules behind find_overlaps, ordered by pairs of branches.
 std::vector<PathContact> find_path_contacts(const SmoothedTree& tree,
-                                         const OverlapOptions& options = {});
+                                            const OverlapOptions& options = {});
 
 // "branches 12_40 and 33_35 overlap by 0.41 mm near (1.2, 3.4, 5.6)".
 std::string overlap_text(const SmoothedTree& tree, const Overlap& overlap);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <numeric>
 #include <set>
 #include <tuple>
 
@@ -12,11 +11,10 @@
 #include "base/contract.h"
 #include "base/disjoint_sets.h"
 #include "base/index.h"
+#include "modeling/tree/rules.h"
 
 namespace angiospline {
 namespace {
-
-constexpr int kNamedJoins = 8;  // joined ends that are listed by name
 
 // For each point the edges at it, as one flat list (compressed rows).
 class Incidence {
@@ -60,6 +58,7 @@ class TreeBuilder {
   explicit TreeBuilder(const PointGraph& graph) : graph_(graph), groups_(graph.points.size()) {}
 
   Result<CenterlineTree> build() {
+    // What is one point, in the order of the header's list; then what is left of the edges.
     join_along_edges();
     join_siblings();
     join_ends();
@@ -71,6 +70,7 @@ class TreeBuilder {
                    {},
                    "two points at different positions must be connected"});
     }
+
     collect_pairs();
     trace_chains();
     orient_and_choose_inlets();
@@ -90,11 +90,9 @@ class TreeBuilder {
     say(zero_length, "edge of zero length", "edges of zero length", "removed");
   }
 
-  // Neighbours of one point at the same position are one point; their own neighbours follow, so a
-  // worklist of groups runs until nothing changes. Joining moves the smaller edge list.
-  void join_siblings() {
-    const std::size_t count = graph_.points.size();
-    std::vector<std::vector<int>> neighbours(count);
+  // For each group those it is joined to by edges; equal ones more than once.
+  std::vector<std::vector<int>> neighbours_of_groups() {
+    std::vector<std::vector<int>> neighbours(graph_.points.size());
     for (const auto& [a, b] : graph_.edges) {
       const int ga = groups_.root(a);
       const int gb = groups_.root(b);
@@ -102,36 +100,50 @@ class TreeBuilder {
       neighbours[index(ga)].push_back(gb);
       neighbours[index(gb)].push_back(ga);
     }
+    return neighbours;
+  }
+
+  // A group's neighbours as they are now, each once, with those at the same place side by side.
+  std::vector<std::pair<Key, int>> sorted_by_place(int g, const std::vector<int>& neighbours) {
+    std::vector<std::pair<Key, int>> around;
+    for (const int n : neighbours) {
+      const int other = groups_.root(n);
+      if (other != g) around.emplace_back(key_of(position(other)), other);
+    }
+    std::sort(around.begin(), around.end());
+    around.erase(std::unique(around.begin(), around.end()), around.end());
+    return around;
+  }
+
+  // Neighbours of one point at the same position are one point; their own neighbours follow, so a
+  // worklist of groups runs until nothing changes.
+  void join_siblings() {
+    std::vector<std::vector<int>> neighbours = neighbours_of_groups();
     std::vector<int> work;
-    for (std::size_t g = count; g-- > 0;) {
+    for (std::size_t g = neighbours.size(); g-- > 0;) {
       if (neighbours[g].size() > 1) work.push_back(static_cast<int>(g));
     }
+
     int joined = 0;
-    std::vector<std::pair<Key, int>> around;
     while (!work.empty()) {
       const int g = work.back();
       work.pop_back();
       if (groups_.root(g) != g || neighbours[index(g)].size() < 2) continue;
-      around.clear();
-      for (const int n : neighbours[index(g)]) {
-        const int other = groups_.root(n);
-        if (other != g) around.emplace_back(key_of(position(other)), other);
-      }
-      std::sort(around.begin(), around.end());
-      around.erase(std::unique(around.begin(), around.end()), around.end());
-      auto& kept = neighbours[index(g)];
-      kept.clear();
-      for (const auto& [key, other] : around) kept.push_back(other);
+      const auto around = sorted_by_place(g, neighbours[index(g)]);
+      neighbours[index(g)].clear();
+      for (const auto& [key, other] : around) neighbours[index(g)].push_back(other);
+
       for (std::size_t i = 1; i < around.size(); ++i) {
         if (around[i].first != around[i - 1].first) continue;
         const int a = groups_.root(around[i - 1].second);
         const int b = groups_.root(around[i].second);
         if (!groups_.join(a, b)) continue;
         ++joined;
+
+        // The smaller list moves, so that all moves together are O(n log n).
         const int winner = groups_.root(a);
-        const int loser = winner == a ? b : a;
         auto& to = neighbours[index(winner)];
-        auto& from = neighbours[index(loser)];
+        auto& from = neighbours[index(winner == a ? b : a)];
         if (to.size() < from.size()) to.swap(from);
         to.insert(to.end(), from.begin(), from.end());
         from.clear();
@@ -143,6 +155,8 @@ class TreeBuilder {
         "position: joined with it");
   }
 
+  // An end at the place of another point is joined to it: so loops are closed in files that cannot
+  // close them.
   void join_ends() {
     std::vector<int> degree(graph_.points.size(), 0);
     for (const auto& [a, b] : graph_.edges) {
@@ -152,12 +166,15 @@ class TreeBuilder {
       ++degree[index(ga)];
       ++degree[index(gb)];
     }
+
     std::vector<std::pair<Key, int>> places;
     for (std::size_t p = 0; p < graph_.points.size(); ++p) {
       const int g = static_cast<int>(p);
       if (groups_.root(g) == g && degree[p] > 0) places.emplace_back(key_of(position(g)), g);
     }
     std::sort(places.begin(), places.end());
+
+    // Runs of groups in one place, of which one at least is an end.
     int joined = 0;
     std::string names;
     for (std::size_t i = 0; i < places.size();) {
@@ -170,7 +187,7 @@ class TreeBuilder {
       for (std::size_t j = i + 1; has_end && j < last; ++j) {
         if (groups_.join(places[i].second, places[j].second)) {
           ++joined;
-          if (joined <= kNamedJoins) {
+          if (joined <= CleaningRules::kNamedJoins) {
             names += fmt::format("{}{} and {}", joined == 1 ? "" : ", ", name(places[i].second),
                                  name(places[j].second));
           }
@@ -178,7 +195,9 @@ class TreeBuilder {
       }
       i = last;
     }
-    if (joined > kNamedJoins) names += fmt::format(" and {} more", joined - kNamedJoins);
+
+    if (joined > CleaningRules::kNamedJoins)
+      names += fmt::format(" and {} more", joined - CleaningRules::kNamedJoins);
     if (joined > 0)
       tree_.assumptions.push_back("ends at the position of another point joined to it: " + names);
   }
@@ -192,6 +211,7 @@ class TreeBuilder {
       if (a != b) sorted.emplace_back(std::min(a, b), std::max(a, b), static_cast<int>(e));
     }
     std::sort(sorted.begin(), sorted.end());
+
     std::vector<int> kept;
     for (std::size_t i = 0; i < sorted.size(); ++i) {
       const auto& [a, b, e] = sorted[i];
@@ -199,6 +219,8 @@ class TreeBuilder {
       kept.push_back(e);
     }
     say(static_cast<int>(sorted.size() - kept.size()), "doubled edge", "doubled edges", "dropped");
+
+    // In the order of the input again: names and orientations follow it.
     std::sort(kept.begin(), kept.end());
     edges_.reserve(kept.size());
     for (const int e : kept) {
@@ -227,12 +249,15 @@ class TreeBuilder {
       const int g = static_cast<int>(p);
       if (at.degree(g) > 0 && at.degree(g) != 2) add_node(g);
     }
+
     const auto node_count = tree_.nodes.size();
     for (std::size_t n = 0; n < node_count; ++n) {
       const int g = group_of_node_[n];
       for (const int* e = at.begin(g); e != at.end(g); ++e) trace(g, *e, at, done);
     }
-    for (std::size_t e = 0; e < edges_.size(); ++e) {  // what is left are rings
+
+    // What is left are rings, which begin at their lowest point.
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
       if (done[e]) continue;
       const int g = std::min(edges_[e].a, edges_[e].b);
       add_node(g);
@@ -267,10 +292,22 @@ class TreeBuilder {
       const int* next = at.begin(here);
       e = done[index(next[0])] ? next[1] : next[0];
     }
+
+    // The way most of its edges were given.
     if (forward < 0) {
       std::reverse(members.begin(), members.end());
       std::reverse(radii.begin(), radii.end());
     }
+    tree_.branches.push_back(branch_through(members, radii));
+    second_.push_back(members.size() > 2 ? std::pair{members[1], members[members.size() - 2]}
+                                         : std::pair{-1, -1});
+    line_.push_back(line);
+  }
+
+  // The branch through these points; radii of edges, where there are any, count at both their
+  // points.
+  CenterlineBranch branch_through(const std::vector<int>& members,
+                                  const std::vector<double>& radii) {
     CenterlineBranch branch;
     branch.from = node_of_[index(groups_.root(members.front()))];
     branch.to = node_of_[index(groups_.root(members.back()))];
@@ -283,10 +320,7 @@ class TreeBuilder {
       branch.radii_mm(static_cast<Eigen::Index>(i)) =
           of_edges > 0 ? of_edges : graph_.points[index(members[i])].radius_mm;
     }
-    second_.push_back(members.size() > 2 ? std::pair{members[1], members[members.size() - 2]}
-                                         : std::pair{-1, -1});
-    line_.push_back(line);
-    tree_.branches.push_back(std::move(branch));
+    return branch;
   }
 
   // Inlets of the input first, then a chosen one for each component without; branches then point
@@ -302,6 +336,8 @@ class TreeBuilder {
       inlets.insert(n);
       has_inlet[index(component[index(n)])] = true;
     }
+
+    // The widest end of each component that is left.
     std::vector<int> widest(tree_.nodes.size(), -1);  // by component
     std::vector<double> width(tree_.nodes.size(), 0.0);
     for (std::size_t n = 0; n < tree_.nodes.size(); ++n) {
@@ -314,6 +350,7 @@ class TreeBuilder {
       width[c] = r;
       widest[c] = static_cast<int>(n);
     }
+
     for (const int n : widest) {
       if (n < 0) continue;
       inlets.insert(n);
@@ -330,6 +367,8 @@ class TreeBuilder {
     std::vector<bool> met(tree_.nodes.size(), false);
     std::vector<bool> passed(tree_.branches.size(), false);
     for (const int n : queue) met[index(n)] = true;
+
+    // In breadth: where two ways meet, the branch between points from the nearer one.
     for (std::size_t q = 0; q < queue.size(); ++q) {
       for (const int b : at[index(queue[q])]) {
         if (passed[index(b)]) continue;
@@ -354,6 +393,9 @@ class TreeBuilder {
     for (const int line : line_) {
       if (line >= 0) ++branches_of_line[index(line)];
     }
+
+    // By its ends; by a point between where others have the same ends; by its line's name if that
+    // is its alone. What is still the same is numbered.
     std::map<std::string, int> taken;
     for (std::size_t b = 0; b < tree_.branches.size(); ++b) {
       CenterlineBranch& branch = tree_.branches[b];

@@ -12,6 +12,7 @@
 #include "modeling/build/build_model.h"
 #include "modeling/build/make_room.h"
 #include "modeling/build/plan.h"
+#include "modeling/build/plan_bends.h"
 #include "modeling/check/fidelity.h"
 #include "modeling/tree/smooth_centerlines.h"
 #include "tests/shapes/network_measures.h"
@@ -187,8 +188,8 @@ TreeMaker hooked_fork() {
 
 // Radians by which the branch turns away from its opening's axis, half a radius behind it.
 double turn_behind(const Plan& plan, int node, std::size_t slot) {
-  const PlannedNode& n = plan.nodes()[index(node)];
-  const PlannedBranch& branch = plan.branches()[index(n.ends[slot].branch)];
+  const PlannedNode& n = plan.nodes[index(node)];
+  const PlannedBranch& branch = plan.branches[index(n.ends[slot].branch)];
   const double distance = std::max(n.wanted_mm[slot], n.meets_mm[slot]);
   const double along =
       branch.along_at_distance(n.ends[slot], n.center_mm, distance).value_or(branch.length_mm());
@@ -201,16 +202,17 @@ double turn_behind(const Plan& plan, int node, std::size_t slot) {
 
 TEST(Plan, LetsABranchBendInsideItsJunctionWhereItWouldTurnBehindItsOpening) {
   const SmoothedTree smooth = smooth_centerlines(hooked_fork().tree).value();
-  Plan plan(smooth, {});
-  plan.find_bends();
+  Plan plan = make_plan(smooth, {});
+  find_bends(plan);
   const auto worst = [&] {
     double largest = 0;
     for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, turn_behind(plan, 1, k));
     return largest;
   };
   const double before = worst();
-  EXPECT_TRUE(Plan(plan).bend({0, Plan::kAlternatives, 0, 0}).empty());
-  ASSERT_EQ(plan.bend({0, 0, 0, 0}), std::vector<int>{1});
+  Plan again = plan;
+  EXPECT_TRUE(bend(again, {0, kBendAlternatives, 0, 0}).empty());
+  ASSERT_EQ(bend(plan, {0, 0, 0, 0}), std::vector<int>{1});
   EXPECT_LT(worst(), before - 0.2);
 
   const Model model = build_smoothed(smooth).value();
@@ -359,10 +361,10 @@ TreeMaker crowded_trunk(int forks) {
 
 TEST(RoomMaker, CutsAJunctionWhereTheLeastIsLackingAndThinsVesselsThere) {
   const SmoothedTree tree = smooth_centerlines(crowded_trunk(10).tree).value();
-  const Plan plan(tree, {});
+  const Plan plan = make_plan(tree, {});
   const auto largest = [](const Plan& p) {
     return *std::max_element(
-        p.nodes().begin(), p.nodes().end(),
+        p.nodes.begin(), p.nodes.end(),
         [](const PlannedNode& a, const PlannedNode& b) { return a.ends.size() < b.ends.size(); });
   };
   const PlannedNode before = largest(plan);
@@ -371,12 +373,12 @@ TEST(RoomMaker, CutsAJunctionWhereTheLeastIsLackingAndThinsVesselsThere) {
   RoomMaker room(tree);
   EXPECT_EQ(room.tree().warnings, tree.warnings);
   for (int round = 0; round < 12; ++round) {
-    const PlannedNode now = largest(Plan(room.tree(), {}));
+    const PlannedNode now = largest(make_plan(room.tree(), {}));
     if (now.ends.size() <= 6) break;
     ASSERT_TRUE(room.cut(now));
   }
   const SmoothedTree made = room.tree();
-  EXPECT_LE(largest(Plan(made, {})).ends.size(), 6U);
+  EXPECT_LE(largest(make_plan(made, {})).ends.size(), 6U);
   int thinned = 0;
   for (std::size_t b = 0; b < tree.paths.size(); ++b) {
     const double length = tree.paths[b].knots().last();

@@ -8,7 +8,6 @@
 #include "modeling/tree/clean_tree.h"
 #include "modeling/tree/point_graph.h"
 #include "modeling/tree/smooth_centerlines.h"
-#include "modeling/tree/unit_rounding.h"
 
 namespace angiospline {
 namespace {
