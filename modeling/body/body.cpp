@@ -81,6 +81,7 @@ Sweep sweep_rings(const std::vector<Station>& stations, const RingShape& start,
   sweep.values.resize(count, static_cast<Eigen::Index>(15 * start.size()));
   for (Eigen::Index i = 0; i < count; ++i) {
     const double t = static_cast<double>(i) / static_cast<double>(count - 1);
+
     const Station& station = stations[static_cast<std::size_t>(i)];
     const std::vector<Vec2> ring = blend_rings(start, end, smooth_step(t));
     for (std::size_t c = 0; c < ring.size(); ++c) {
@@ -286,6 +287,7 @@ std::vector<Arc> two_arc_circle(const Vec3& center, double radius, const Vec3& t
                                 const Vec3& seam) {
   // The quintic nearest to a half circle; the tangents at its ends are exact.
   constexpr double kA = 0.668198, kB = 1.265900, kC = 0.442084;
+
   const Vec3 across = -tangent.cross(seam);  // a quarter turn clockwise about the tangent
   std::vector<Arc> arcs(2);
   const std::array<double, 6> along{1, 1, kC, -kC, -1, -1};

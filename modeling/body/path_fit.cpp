@@ -48,6 +48,7 @@ void resample(Rail& rail, int count) {
     points.col(i) = (1 - f) * rail.points.col(column) + f * rail.points.col(column + 1);
     parameters.push_back(t);
   }
+
   rail.points = std::move(points);
   rail.parameters = std::move(parameters);
 }
@@ -57,6 +58,7 @@ Rail led_in(const Rail& rail, const std::optional<LeadIn>& first,
             const std::optional<LeadIn>& last) {
   const double from = first ? first->joins_at : 0;
   const double to = last ? 1 - last->joins_at : 1;
+
   std::vector<Vec4> points;
   if (first) {
     for (const auto& p : first->samples.colwise()) points.emplace_back(p);

@@ -186,6 +186,7 @@ class Assembler {
     close_end(junctions, piece, first_patch, false);
   }
 
+  // Joins each strip's side at one end to what lies beyond it; a rim takes all of them.
   void close_end(const std::vector<Junction>& junctions, const BodyPiece& piece, int first_patch,
                  bool at_start) {
     const BodyLink& link = at_start ? piece.start_link : piece.end_link;
@@ -205,6 +206,8 @@ class Assembler {
         const int sector =
             sector_of_arc(part.arc, static_cast<int>(opening.patches.size()), at_start);
         const int patch = first_patch_[index(link.junction)] + opening.patches[index(sector)];
+
+        // A body that starts here runs against the opening's own direction.
         Side other{patch, PatchSide::kU0, part.from, part.to};
         if (at_start) {
           other.from = 1 - part.to;
@@ -215,6 +218,7 @@ class Assembler {
         join_on_circle(link.circle, part.arc, own);
       }
     }
+
     if (link.kind == BodyLink::Kind::kRim) network_.rims.push_back(std::move(rim));
   }
 

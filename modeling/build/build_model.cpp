@@ -152,6 +152,8 @@ class ModelBuilder {
     const JunctionSpec& wanted = plan_.nodes[index(n)].spec;
     BuiltJunction& now = built_[index(n)];
     if (same(now.spec, wanted)) return true;
+
+    // Plans come back: what was built for one is kept aside while another is tried.
     std::vector<BuiltJunction>& before = built_before_[index(n)];
     const auto found = std::find_if(before.begin(), before.end(), [&](const BuiltJunction& built) {
       return same(built.spec, wanted);
@@ -160,6 +162,7 @@ class ModelBuilder {
       std::swap(now, *found);
       return true;
     }
+
     if (now.junction) before.push_back(std::move(now));
     now = {};
     return false;
@@ -176,6 +179,7 @@ class ModelBuilder {
       built_[index(work[k])] =
           build_bent_junction(plan_.nodes[index(work[k])], options_.junction, progress_);
     });
+
     bool all = true;
     for (const int n : bent_) {
       if (built_[index(n)].junction) continue;
@@ -232,6 +236,7 @@ class ModelBuilder {
     for (int n = 0; n < static_cast<int>(built_.size()); ++n) {
       const PlannedNode& node = plan_.nodes[index(n)];
       if (!node.is_junction() || built_[index(n)].junction) continue;
+
       if (!node.absorbed.empty() && node.ends.size() > RetryRules::kMayGrow)
         continue;  // it is to be cut
       if (index(round) < RetryRules::kForwardRadii.size()) {
@@ -244,6 +249,7 @@ class ModelBuilder {
         changed = true;
       }
     }
+
     if (changed) settle(plan_);
     return changed;
   }

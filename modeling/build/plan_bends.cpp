@@ -181,6 +181,7 @@ std::vector<Eased> from_other_centres(const Plan& plan, const PlannedNode& node)
   for (const JunctionBranch& branch : node.spec.branches) {
     radius = std::min(radius, branch.radius_mm);
   }
+
   std::vector<Eased> starts;
   for (const Vec3& centre : other_centres(plan, node)) {
     PlannedNode tried = node;
@@ -254,6 +255,7 @@ std::vector<int> bend(Plan& plan, const std::vector<int>& refused) {
       std::swap(plan.nodes[n], plan.bends[n][k]);
     }
   }
+
   if (!bent.empty() && tighten(plan)) settle(plan);
   return bent;
 }

@@ -58,6 +58,7 @@ double sag_of(const PlannedNode& node, const OpeningView& view) {
     const Vec3 arm = view.at(*view.along * i / steps).head<3>() - node.center_mm;
     const Vec3 beyond = arm - opening.offset_mm;
     if (beyond.norm() < r) continue;
+
     double away = (beyond - beyond.dot(opening.direction) * opening.direction).norm();
     if (core > 0) {
       const double share = std::clamp(arm.dot(opening.offset_mm) / (core * core), 0.0, 1.0);
@@ -167,6 +168,7 @@ std::vector<Candidate> farther_or_nearer(const Plan& plan, const PlannedNode& gi
     candidates.push_back({given});
     candidates.back().node.farther_mm[slot] = distance;
   }
+
   for (const double share : ReliefRules::kOneNearer) {
     candidates.push_back({given});
     candidates.back().node.caps_mm[slot] =

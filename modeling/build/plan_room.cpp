@@ -129,6 +129,8 @@ BranchRoom room_of(const Plan& plan, int b) {
           ? (plan.nodes[index(branch.to)].center_mm - plan.nodes[index(branch.from)].center_mm)
                 .norm()
           : branch.length_mm();
+
+  // Openings from both ends; a free end takes nothing, but has a radius.
   for (const bool at_end : {false, true}) {
     const BranchEnd end{b, at_end};
     const PlannedNode& node = plan.node(end);
@@ -138,6 +140,7 @@ BranchRoom room_of(const Plan& plan, int b) {
     room.radius += is_measured(node) ? node.spec.branches[plan.slot(end)].radius_mm / 2
                                      : branch.at_from(end, 0.0)(3) / 2;
   }
+
   room.body = (branch.straight ? RoomRules::kLeastStraight : RoomRules::kLeastBody) * room.radius;
   room.least += room.body;
   room.wanted += room.body;

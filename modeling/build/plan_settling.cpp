@@ -48,6 +48,7 @@ bool drop_twins(Plan& plan, int n) {
       const PlannedBranch& b = plan.branch(ends[j]);
       if (ends[i].branch == ends[j].branch || far_node(a) != far_node(b)) continue;
       if (are_apart(a, b)) continue;
+
       const bool a_thinner = a.samples.row(3).mean() < b.samples.row(3).mean();
       const std::string why = fmt::format("it runs inside branch {}", a_thinner ? b.name : a.name);
       drop(plan, (a_thinner ? ends[i] : ends[j]).branch, why);
@@ -142,6 +143,8 @@ void make_room_for(Plan& plan, int b, const BranchRoom& room) {
   const PlannedBranch& branch = plan.branches[index(b)];
   const bool from = plan.nodes[index(branch.from)].is_junction();
   const bool to = plan.nodes[index(branch.to)].is_junction();
+
+  // Between two junctions nothing can be made longer.
   if (from && to && branch.from == branch.to) {
     drop(plan, b, "a loop that lies inside its junction");
     return;
@@ -151,6 +154,8 @@ void make_room_for(Plan& plan, int b, const BranchRoom& room) {
           fmt::format("is {:.3g} mm long and the two need {:.3g}", room.length, room.least));
     return;
   }
+
+  // A free end can: to its opening, and a body's length beyond.
   const double missing = room.least - room.length + RoomRules::kLeastBody * room.radius;
   if (missing > RoomRules::kLongestExtension * room.radius) {
     drop(plan, b, fmt::format("it ends {:.3g} mm before the opening of its junction", missing));

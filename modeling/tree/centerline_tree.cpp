@@ -6,6 +6,7 @@
 #include "base/index.h"
 
 namespace angiospline {
+
 std::vector<std::vector<int>> branches_at_nodes(const CenterlineTree& tree) {
   std::vector<std::vector<int>> at(tree.nodes.size());
   for (std::size_t b = 0; b < tree.branches.size(); ++b) {

@@ -29,6 +29,7 @@ void drop_repeated_points(CenterlineBranch& branch) {
     branch.points_mm.col(kept) = branch.points_mm.col(i);
     branch.radii_mm(kept++) = branch.radii_mm(i);
   }
+
   branch.points_mm.conservativeResize(3, kept);
   branch.radii_mm.conservativeResize(kept);
 }
@@ -157,6 +158,7 @@ class Cleaner {
       const auto bad = std::find_if(
           r.begin(), r.end(), [](double value) { return !(value > 0 && std::isfinite(value)); });
       if (bad == r.end()) continue;
+
       alive_[b] = false;
       warnings_.push_back(
           {WarningCode::kBadRadius,
@@ -230,6 +232,9 @@ class Cleaner {
     if (ends_at_from == (at[index(branch.to)].size() == 1)) return false;
     const int node = ends_at_from ? branch.to : branch.from;
     if (at[index(node)].size() < 3) return false;
+
+    // Inside the tube of another branch that is as thick somewhere, no farther along it than the
+    // spur is long, twice: a vessel that leaves and comes near again is none.
     const Eigen::Index tip = ends_at_from ? 0 : branch.points_mm.cols() - 1;
     const double reach = 2 * length_mm(branch);
     for (const int other : at[index(node)]) {

@@ -242,6 +242,7 @@ class Separator {
       places_.resize(b + 1);
     }
     measure_back(b);
+
     own_[b] = Eigen::Matrix3Xd::Zero(3, count);
     held_[b].resize(2, count);
     for (Eigen::Index i = 0; i < count; ++i) {
@@ -295,12 +296,14 @@ class Separator {
     // A vessel does not get out of the way by moving along itself.
     const Vec3 own = tree_.paths[index(branch)].at(along, 1).head<3>().normalized();
     const Vec3 across = way - way.dot(own) * own;
+
     Request& request = prepared(all, branch);
     for_near(branch, along, SeparationRules::kMoveWidth * radius,
              [&](Eigen::Index i, double weight) {
                request.moves.col(i) += weight * across;
                request.weights(i) += weight;
              });
+
     for (const bool at_end : {false, true}) {
       const double weight = hold(branch, at_end, along);
       Vec4& node = of_nodes[index(node_of(branch, at_end))];
@@ -446,6 +449,7 @@ class Separator {
                  "neighbours",
                  name, change.moved_mm, change.moved_radii)});
       }
+
       if (change.kept < 1 - SeparationRules::kWorthNaming) {
         tree_.warnings.push_back(
             {WarningCode::kThinnedForClearance,

@@ -211,6 +211,7 @@ class LineMerger {
         neighbours_.emplace_back();
         line_of_.push_back(static_cast<int>(merged_.graph.line_names.size()) - 1);
       }
+
       if (before >= 0 && !(shared[i] && was_shared)) connect(before, here);
       before = here;
     }

@@ -240,6 +240,7 @@ double way_over_radii(const SmoothedTree& tree, const PathContact& c) {
   const CenterlineBranch& b = tree.tree.branches[index(c.second)];
   const BSplineCurve<4>& path_a = tree.paths[index(c.first)];
   const BSplineCurve<4>& path_b = tree.paths[index(c.second)];
+
   double way = std::numeric_limits<double>::infinity();
   for (const auto& [node_a, way_a] :
        {std::pair(a.from, c.first_along), {a.to, path_a.knots().last() - c.first_along}}) {
@@ -266,12 +267,15 @@ std::map<std::pair<int, int>, std::vector<Contact>> contacts_by_pair(
     const double sum = p->radius + q->radius;
     const double way = q->start_mm - p->start_mm;
     if (p->branch == q->branch && way < 0.5 * OverlapRules::kReturnRadii * sum) return;
+
+    // Walls, so radii count; the clearance is in those of the thinner vessel.
     const auto [u, v] = nearest_points(*p, *q);
     const double depth = sum + clearance * std::min(p->radius, q->radius) - (u - v).norm();
     if (depth <= 0) return;
     contacts[{p->branch, q->branch}].push_back(
         {p->number, q->number, {p->branch, q->branch, along(*p, u), along(*q, v), u, v, depth}});
   };
+
   for (std::size_t i = 0; i < capsules.size(); ++i) {
     grids.for_larger(static_cast<int>(i),
                      [&](int j) { compare(&capsules[i], &capsules[index(j)]); });

@@ -171,6 +171,7 @@ std::vector<Warning> warnings_of(const CenterlineBranch& branch, const SmoothPat
                                     "reduced to {:.0f} % there",
                                     branch.name, 100 * path.radius_reduced_to)});
   }
+
   if (path.sharpest_bend > SmoothingRules::kFoldingBend) {
     warnings.push_back(
         {WarningCode::kBendTooSharp,
@@ -188,10 +189,13 @@ std::optional<Error> take_paths(std::vector<std::optional<SmoothPath>> paths, Sm
     CenterlineBranch& branch = tree.tree.branches[b];
     branch.points_mm.col(0) = tree.tree.nodes[index(branch.from)].position_mm;
     branch.points_mm.rightCols(1) = tree.tree.nodes[index(branch.to)].position_mm;
+
     tree.largest_move_mm = std::max(tree.largest_move_mm, paths[b]->largest_move_mm);
     for (Warning& warning : warnings_of(branch, *paths[b])) {
       tree.warnings.push_back(std::move(warning));
     }
+
+    // Numbers that differ too much in size overflow somewhere on the way.
     if (!paths[b]->path.control_points().allFinite()) {
       return Error{ErrorKind::kBadInput,
                    "the branch cannot be smoothed",

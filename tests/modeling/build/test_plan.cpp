@@ -107,7 +107,7 @@ TEST(PlannedBranch, ThatPassesACentreCountsFromWhereItPasses) {
   EXPECT_NEAR(branch.along_nearest({0, false}, beside), 3, 0.1);
   // The distance 2 is left at sqrt(3) beyond the nearest place, not where the path begins.
   EXPECT_NEAR(branch.along_at_distance({0, false}, beside, 2).value(), 3 + std::sqrt(3), 0.02);
-  // A centre that the path comes near to only after a long way is none it passes.
+  // One that it leaves from the beginning on is not passed.
   EXPECT_LE(branch.along_nearest({0, false}, {-1, 0, 0}), 0.0);
 }
 
@@ -216,7 +216,7 @@ TEST(PlanMeasures, KeepsToWhatTheNodeAsksFor) {
   asked.caps_mm[0] = (free.least_mm[0] + free.wanted_mm[0]) / 2;
   asked.farther_mm[1] = free.wanted_mm[1] + 3;
   asked = measured(plan, asked);
-  EXPECT_NEAR(asked.wanted_mm[0], (free.least_mm[0] + free.wanted_mm[0]) / 2, 1e-12);
+  EXPECT_NEAR(asked.wanted_mm[0], (free.least_mm[0] + free.wanted_mm[0]) / 2, 1e-9);
   EXPECT_GE(asked.follows_mm(1), free.wanted_mm[1] + 3);
 }
 
@@ -293,12 +293,12 @@ TEST(PlanRoom, IsTheLengthOfTheBranchAgainstItsOpeningsAndBody) {
 }
 
 TEST(PlanRoom, ABranchIsTakenStraightOnlyWhereItsChordStaysInTheVessel) {
-  for (const double sag : {0.5, 2.0}) {
-    Sticks sticks = two_forks(3);
+  for (const double sag : {0.5, 0.9}) {
+    const Sticks sticks = two_forks(2);
     // The trunk in an arc of three points.
     Sticks bent;
     bent.tree.tree.nodes = sticks.tree.tree.nodes;
-    bent.curve(0, 1, 1.0, {{0, 0, 0}, {sag, 0, 1.5}, {0, 0, 3}});
+    bent.curve(0, 1, 1.0, {{0, 0, 0}, {sag, 0, 1}, {0, 0, 2}});
     for (std::size_t b = 1; b < sticks.tree.paths.size(); ++b) {
       bent.tree.paths.push_back(sticks.tree.paths[b]);
       bent.tree.tree.branches.push_back(sticks.tree.tree.branches[b]);

@@ -194,6 +194,8 @@ TEST(PlannedBody, OfAFreeEndBesideTheOpeningIsTheOpeningClosed) {
 
   // Between junctions that failed nothing is left of it.
   cut.number[0] = -1;
+  branch.samples(0, 1) = node.follows_mm(0) + 0.5 * PlannedBodyRules::kShortestPiece;
+  measure_length(branch);
   const PlannedBody nothing = build_planned_body(cut.around(), 0);
   ASSERT_TRUE(nothing.failed);
   EXPECT_EQ(nothing.failed->name, "wall_m_a");
