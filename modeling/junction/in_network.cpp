@@ -10,15 +10,16 @@
 
 #include "base/index.h"
 #include "kernel/evaluate/grid.h"
+#include "modeling/junction/patch_basis.h"
+#include "modeling/junction/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kSize = 6;
-constexpr int kNodes = 9;  // of the layout, on each side of a patch
+using namespace junction_rules;
 
 bool is_unit_bezier(const KnotVector& knots) {
-  return knots.degree() == kSize - 1 && knots.control_point_count() == kSize &&
+  return knots.degree() == kPatchSize - 1 && knots.control_point_count() == kPatchSize &&
          knots.first() == 0 && knots.last() == 1;
 }
 
@@ -69,15 +70,20 @@ class Finder {
   // Poles by the pool column of the patches' corners.
   Defect join_patches() {
     std::map<int, int> poles;
+
+    // Each patch's corners at u = 1.
     for (int p = 0; p < static_cast<int>(result_.patches.size()); ++p) {
       const std::vector<int>& control = network_.patches[index(result_.patches[index(p)])].control;
       const auto pole = [&](int column) {
         return poles.try_emplace(column, static_cast<int>(poles.size())).first->second;
       };
-      patch(p).from = pole(control[kSize * (kSize - 1)]);
-      patch(p).to = pole(control[kSize * kSize - 1]);
+      patch(p).from = pole(control[kPatchSize * (kPatchSize - 1)]);
+      patch(p).to = pole(control[kPatchSize * kPatchSize - 1]);
     }
+
     result_.topology.poles.resize(poles.size());
+
+    // Sides v = 0 and v = 1 meet around a branch, sides u = 1 across a saddle; no others meet.
     for (const Join& join : network_.joins) {
       const int a = number_[index(join.a.patch)];
       const int b = number_[index(join.b.patch)];
@@ -113,23 +119,27 @@ class Finder {
         t.sectors.back().push_back(q);
       }
     }
+
+    // Saddles and poles know the branches beside them by their patches.
     for (JunctionSaddle& saddle : t.saddles) {
       saddle.branch_a = patch(saddle.patch_a).branch;
       saddle.branch_b = patch(saddle.patch_b).branch;
     }
     for (const JunctionPatch& p : t.patches) t.poles[index(p.from)].branches.push_back(p.branch);
+
     return t.sectors.size() < 3 ? fmt::format("it has {} openings", t.sectors.size()) : Defect{};
   }
 
   Defect find_columns() {
-    const SharedGrid grid(result_.topology, kSize);
+    const SharedGrid grid(result_.topology, kPatchSize);
     result_.columns.assign(index(grid.count()), -1);
     for (int p = 0; p < static_cast<int>(result_.patches.size()); ++p) {
       const std::vector<int>& control = network_.patches[index(result_.patches[index(p)])].control;
-      for (int k = 0; k < kSize * kSize; ++k) {
-        int& column = result_.columns[index(grid.at(p, k / kSize, k % kSize))];
+      for (int k = 0; k < kPatchSize * kPatchSize; ++k) {
+        int& column = result_.columns[index(grid.at(p, k / kPatchSize, k % kPatchSize))];
         if (column >= 0 && column != control[index(k)]) {
-          return fmt::format("patch {} does not share its control points", result_.patches[index(p)]);
+          return fmt::format("patch {} does not share its control points",
+                             result_.patches[index(p)]);
         }
         column = control[index(k)];
       }
@@ -160,15 +170,18 @@ Vec3 local(const JunctionInNetwork& junction, const SurfaceNetwork& network, int
 OpeningFrame present_opening(const JunctionInNetwork& junction, const SurfaceNetwork& network,
                              const std::vector<int>& sectors) {
   OpeningFrame frame;
-  Points3 rim(3, static_cast<Eigen::Index>(sectors.size()) * (kSize - 1));
+  Points3 rim(3, static_cast<Eigen::Index>(sectors.size()) * (kPatchSize - 1));
   Eigen::Index k = 0;
+
+  // The axis is the mean way out, from the second row to the rim.
   for (const int p : sectors) {
     const std::vector<int>& control = network.patches[index(junction.patches[index(p)])].control;
-    for (int j = 0; j + 1 < kSize; ++j, ++k) {
+    for (int j = 0; j + 1 < kPatchSize; ++j, ++k) {
       rim.col(k) = local(junction, network, control[index(j)]);
-      frame.axis += rim.col(k) - local(junction, network, control[index(kSize + j)]);
+      frame.axis += rim.col(k) - local(junction, network, control[index(kPatchSize + j)]);
     }
   }
+
   frame.center = rim.rowwise().mean();
   frame.axis.normalize();
   frame.radius = std::sqrt((rim.colwise() - frame.center).colwise().squaredNorm().mean());
@@ -189,21 +202,24 @@ Result<JunctionInNetwork> junction_in_network(const SurfaceNetwork& network, int
 }
 
 JunctionLayout present_layout(const JunctionInNetwork& junction, const SurfaceNetwork& network) {
-  JunctionLayout layout{SharedGrid(junction.topology, kNodes), {}, {}, {}};
+  JunctionLayout layout{SharedGrid(junction.topology, kFine), {}, {}, {}};
   const int count = layout.grid.count();
   layout.nodes.resize(3, count);
   layout.normals = Points3::Zero(3, count);
-  const std::vector<double> steps = spaced(0, 1, kNodes);
+  const std::vector<double> steps = spaced(0, 1, kFine);
+
+  // Nodes on an edge get the mean of both patches' normals.
   for (int p = 0; p < static_cast<int>(junction.patches.size()); ++p) {
     const auto grid =
         evaluate_grid(patch_surface(network, junction.patches[index(p)]), steps, steps, 1);
-    for (int k = 0; k < kNodes * kNodes; ++k) {
-      const int node = layout.grid.at(p, k / kNodes, k % kNodes);
+    for (int k = 0; k < kFine * kFine; ++k) {
+      const int node = layout.grid.at(p, k / kFine, k % kFine);
       layout.nodes.col(node) = (grid.points().col(k) - junction.center_mm) / junction.radius_mm;
       const Vec3 normal = Vec3(grid.partial(1, 0).col(k)).cross(Vec3(grid.partial(0, 1).col(k)));
       layout.normals.col(node) += normal.normalized();
     }
   }
+
   layout.normals.colwise().normalize();
   for (const std::vector<int>& sectors : junction.topology.sectors) {
     layout.openings.push_back(present_opening(junction, network, sectors));
@@ -213,7 +229,7 @@ JunctionLayout present_layout(const JunctionInNetwork& junction, const SurfaceNe
 
 JunctionNet present_net(const JunctionInNetwork& junction, const JunctionLayout& layout,
                         const SurfaceNetwork& network) {
-  JunctionNet net{SharedGrid(junction.topology, kSize), {}, {}, {}, 0};
+  JunctionNet net{SharedGrid(junction.topology, kPatchSize), {}, {}, {}, 0};
   const int count = net.grid.count();
   net.points.resize(3, count);
   net.slots.resize(index(count));
@@ -221,14 +237,17 @@ JunctionNet present_net(const JunctionInNetwork& junction, const JunctionLayout&
   for (int k = 0; k < count; ++k) {
     net.points.col(k) = local(junction, network, junction.columns[index(k)]);
   }
+
   for (int p = 0; p < static_cast<int>(junction.patches.size()); ++p) {
     const OpeningFrame& frame = layout.openings[index(junction.topology.patches[index(p)].branch)];
-    for (int i = 0; i < kSize; ++i) {
-      for (int j = 0; j < kSize; ++j) {
+    for (int i = 0; i < kPatchSize; ++i) {
+      for (int j = 0; j < kPatchSize; ++j) {
         const int id = net.grid.at(p, i, j);
         net.scale[index(id)] = std::min(net.scale[index(id)], frame.radius);
         net.slots[index(id)].count = i == 0 ? 0 : i == 1 ? 1 : 3;
         net.slots[index(id)].along = -frame.axis;
+
+        // The second row slides along the axis: what is off it is put back.
         if (i != 1) continue;
         const Vec3 rim = net.points.col(net.grid.at(p, 0, j));
         const double depth = frame.axis.dot(rim - Vec3(net.points.col(id)));
@@ -236,6 +255,7 @@ JunctionNet present_net(const JunctionInNetwork& junction, const JunctionLayout&
       }
     }
   }
+
   for (ControlSlot& slot : net.slots) {
     slot.first = net.unknowns;
     net.unknowns += slot.count;

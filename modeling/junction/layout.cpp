@@ -11,159 +11,15 @@
 
 #include "base/contract.h"
 #include "base/index.h"
+#include "modeling/junction/layout_start.h"
+#include "modeling/junction/rules.h"
 
 namespace angiospline {
 namespace {
 
+using namespace junction_rules;
+
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr int kCoarse = 5;
-constexpr int kFine = 9;
-constexpr double kLongestMove = 0.5;    // of a node in one sweep, in sides of the quads around it
-constexpr double kSettled = 0.01;       // moves in one sweep that are not worth another
-constexpr double kLeastEpsilon = 0.02;  // of area that distortion tells from none
-
-double wrapped(double angle) { return angle - kTurn * std::round(angle / kTurn); }
-
-// Seams near the wanted azimuths whose sectors keep between half and twice
-// their equal share.
-std::vector<double> bounded_seams(const std::vector<double>& wanted) {
-  const std::size_t count = wanted.size();
-  const double share = kTurn / static_cast<double>(count);
-  const double least = count == 2 ? share : share / 2;
-  const double most = count == 2 ? share : std::min(2 * share, std::numbers::pi);
-  std::vector<double> sector(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const double angle = wrapped(wanted[(k + 1) % count] - wanted[k]);
-    sector[k] = angle > 0 ? angle : angle + kTurn;
-  }
-  for (int pass = 0; pass < 60; ++pass) {
-    double sum = 0;
-    for (double& s : sector) sum += s = std::clamp(s, least, most);
-    for (double& s : sector) s += (kTurn - sum) / static_cast<double>(count);
-  }
-  std::vector<double> seams(count, 0.0);
-  for (std::size_t k = 1; k < count; ++k) seams[k] = seams[k - 1] + sector[k - 1];
-  double sine = 0;
-  double cosine = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    sine += std::sin(wanted[k] - seams[k]);
-    cosine += std::cos(wanted[k] - seams[k]);
-  }
-  const double turn = std::atan2(sine, cosine);
-  for (double& s : seams) s += turn;
-  return seams;
-}
-
-double azimuth(const OpeningFrame& frame, const Vec3& x) {
-  const Vec3 arm = x - frame.center;
-  return std::atan2(frame.y.dot(arm), frame.x.dot(arm));
-}
-
-std::vector<OpeningFrame> start_openings(const JunctionTopology& topology,
-                                         const JunctionTarget& target,
-                                         const std::vector<Vec3>& poles,
-                                         const std::vector<double>& distances) {
-  std::vector<OpeningFrame> frames;
-  for (std::size_t b = 0; b < topology.sectors.size(); ++b) {
-    const TargetBranch& branch = target.branches()[b];
-    OpeningFrame frame;
-    frame.axis = branch.direction;
-    frame.center = branch.start + distances[b] * branch.direction;
-    frame.radius = branch.radius;
-    // Far enough out that a branch beside the centre sees it on the right side.
-    const double reach = branch.radius + branch.start.norm();
-    const auto pole = [&](int patch) -> Vec3 {
-      return reach * poles[index(topology.patches[index(patch)].from)];
-    };
-    const Vec3 first = pole(topology.sectors[b].front()) - frame.center;
-    const Vec3 across = first - first.dot(frame.axis) * frame.axis;
-    frame.x = across.norm() > 1e-6 * reach ? across.normalized() : frame.axis.unitOrthogonal();
-    frame.y = frame.axis.cross(frame.x);
-    std::vector<double> wanted;
-    for (const int patch : topology.sectors[b]) wanted.push_back(azimuth(frame, pole(patch)));
-    frame.seams_rad = bounded_seams(wanted);
-    frames.push_back(std::move(frame));
-  }
-  return frames;
-}
-
-// Where a saddle crosses between its branches.
-struct Crossing {
-  Vec3 direction;
-  double distance;  // of the crotch of the two cylinders, at most that of the
-                    // nearer opening
-};
-
-// The ray from the origin to a branch's opening, with its length.
-TargetBranch seen_from_origin(const JunctionTarget& target, int branch,
-                              const std::vector<double>& distances) {
-  TargetBranch seen = target.branches()[index(branch)];
-  seen.length = distances[index(branch)];
-  if (seen.start.isZero(0)) return seen;
-  const Vec3 opening = seen.start + seen.length * seen.direction;
-  seen.length = opening.norm();
-  seen.direction = opening / seen.length;
-  seen.start.setZero();
-  return seen;
-}
-
-// The crotch of two cylinders lies at the angle beta from a with r_a /
-// sin(beta) = r_b / sin(angle
-// - beta); a saddle that does not pass between its branches crosses in the
-// middle of its Voronoi arc.
-Crossing crossing(const JunctionTopology& topology, const JunctionTarget& target,
-                  const JunctionSaddle& saddle, const std::vector<double>& distances) {
-  const TargetBranch a = seen_from_origin(target, saddle.branch_a, distances);
-  const TargetBranch b = seen_from_origin(target, saddle.branch_b, distances);
-  const Vec3& from = topology.poles[index(saddle.from)].direction;
-  const Vec3& to = topology.poles[index(saddle.to)].direction;
-  const Vec3 edge = (b.direction - a.direction).normalized();
-  const Vec3 side = -edge.cross(from);  // the arc turns from `from` towards it
-  const double arc = std::acos(std::clamp(from.dot(to), -1.0, 1.0));
-  const Vec3 sum = a.direction + b.direction;
-  const double angle = std::acos(std::clamp(a.direction.dot(b.direction), -1.0, 1.0));
-  const double turn = std::atan2(side.dot(sum), from.dot(sum));
-  const double nearest = std::min(a.length, b.length);
-  if (sum.norm() > 0.5 && turn > 0 && turn < arc) {
-    const double raw =
-        std::atan2(a.radius * std::sin(angle), b.radius + a.radius * std::cos(angle));
-    const double keep =
-        angle < std::numbers::pi / 2 ? 0.05 : 0.05 + 0.8 * (angle / std::numbers::pi - 0.5);
-    const double beta = std::clamp(raw, keep * angle, (1 - keep) * angle);
-    const Vec3 across = (b.direction - std::cos(angle) * a.direction).normalized();
-    const double distance = (a.radius + b.radius) / (2 * std::sin(angle / 2));
-    return {std::cos(beta) * a.direction + std::sin(beta) * across, std::min(distance, nearest)};
-  }
-  const Vec3 middle = std::cos(arc / 2) * from + std::sin(arc / 2) * side;
-  return {middle, std::min(a.radius, b.radius)};
-}
-
-// A pole starts above the mean of the crossings around it.
-std::vector<Vec3> start_poles(const JunctionTopology& topology, const JunctionTarget& target,
-                              const std::vector<Crossing>& crossings) {
-  std::vector<Vec3> sums(topology.poles.size(), Vec3::Zero());
-  std::vector<double> lifts(topology.poles.size(), 0.0);
-  for (std::size_t s = 0; s < crossings.size(); ++s) {
-    const JunctionSaddle& saddle = topology.saddles[s];
-    for (const int pole : {saddle.from, saddle.to}) {
-      const double count = static_cast<double>(topology.poles[index(pole)].branches.size());
-      sums[index(pole)] += crossings[s].distance * crossings[s].direction / count;
-      lifts[index(pole)] += (target.branches()[index(saddle.branch_a)].radius +
-                          target.branches()[index(saddle.branch_b)].radius) /
-                         (2 * count);
-    }
-  }
-  std::vector<Vec3> directions;
-  for (std::size_t k = 0; k < sums.size(); ++k) {
-    const Vec3& n = topology.poles[k].direction;
-    const double up = n.dot(sums[k]);
-    const Vec3 along = sums[k] - up * n;
-    // A pole on the far side of branches that lean away from it stays there.
-    const double share = std::clamp(1 + 2 * up / lifts[k], 0.0, 1.0);
-    directions.push_back((share * along + std::max(up, lifts[k]) * n).normalized());
-  }
-  return directions;
-}
 
 class Relaxation {
  public:
@@ -177,8 +33,10 @@ class Relaxation {
         nodes_(3, grid_.count()),
         normals_(3, grid_.count()) {
     longest_ = 0;
-    for (const OpeningFrame& f : openings_)
+    for (const OpeningFrame& f : openings_) {
       longest_ = std::max(longest_, f.center.norm() + f.radius);
+    }
+
     connect();
     place_openings();
   }
@@ -186,7 +44,7 @@ class Relaxation {
   // Saddles run from pole to pole through their crossings, all lines between
   // them and the openings straight, and everything is moved along rays from the
   // centre onto the target.
-  void start(const std::vector<Vec3>& poles, const std::vector<Crossing>& crossings) {
+  void start(const std::vector<Vec3>& poles, const std::vector<SaddleCrossing>& crossings) {
     const int last = grid_.size() - 1;
     for (int p = 0; p < patch_count(); ++p) {
       const JunctionPatch& patch = topology_.patches[index(p)];
@@ -195,7 +53,9 @@ class Relaxation {
       const Vec3 from = target_.on_ray(poles[index(saddle.from)], longest_);
       const Vec3 to = target_.on_ray(poles[index(saddle.to)], longest_);
       const Vec3 middle = target_.on_ray(crossings[index(patch.saddle)].direction, longest_);
+
       for (int j = 0; j <= last; ++j) {
+        // The parabola through both poles and the crossing.
         const double s = static_cast<double>(is_a ? j : last - j) / last;
         const Vec3 on_arc =
             (1 - s) * (1 - 2 * s) * from + 4 * s * (1 - s) * middle + s * (2 * s - 1) * to;
@@ -214,6 +74,7 @@ class Relaxation {
   void start_from(const JunctionLayout& coarse) {
     const int last = grid_.size() - 1;
     for (int p = 0; p < patch_count(); ++p) {
+      // Means of the coarse nodes around, put back on the target.
       for (int i = 1; i <= last; ++i) {
         for (int j = 0; j <= last; ++j) {
           Vec3 sum = Vec3::Zero();
@@ -242,11 +103,14 @@ class Relaxation {
       }
       return sum;
     };
+
     for (Quad& quad : quads_) {
       const JunctionPatch& patch = topology_.patches[index(quad.patch)];
       const JunctionSaddle& saddle = topology_.saddles[index(patch.saddle)];
-      const double least = 0.5 * std::min(target_.branches()[index(saddle.branch_a)].radius,
-                                          target_.branches()[index(saddle.branch_b)].radius);
+      const double least = kLeastSide * std::min(target_.branches()[index(saddle.branch_a)].radius,
+                                                 target_.branches()[index(saddle.branch_b)].radius);
+
+      // Between the sides of the patch by the quad's place, as in a ruled surface.
       const double u = (quad.i + 0.5) / last;
       const double v = (quad.j + 0.5) / last;
       const double along_u = (1 - v) * std::max(least, length(quad.patch, true, 0)) +
@@ -272,7 +136,8 @@ class Relaxation {
       std::vector<double> wanted;
       for (std::size_t k = 0; k < frame.seams_rad.size(); ++k) {
         const int leg = grid_.at(topology_.sectors[b][k], 1, 0);
-        const double turn = wrapped(azimuth(frame, nodes_.col(leg)) - frame.seams_rad[k]);
+        const double turn =
+            wrapped_angle(opening_azimuth(frame, nodes_.col(leg)) - frame.seams_rad[k]);
         wanted.push_back(frame.seams_rad[k] + options_.follow * turn);
       }
       frame.seams_rad = bounded_seams(wanted);
@@ -303,6 +168,8 @@ class Relaxation {
     for (std::size_t b = 0; b < openings_.size(); ++b) {
       const OpeningFrame& frame = openings_[b];
       const std::size_t count = frame.seams_rad.size();
+
+      // From seam to seam; the last sector closes the turn.
       for (std::size_t k = 0; k < count; ++k) {
         const double from = frame.seams_rad[k];
         const double to = k + 1 < count ? frame.seams_rad[k + 1] : frame.seams_rad[0] + kTurn;
@@ -341,19 +208,26 @@ class Relaxation {
         }
       }
     }
+
     for (int node = 0; node < grid_.count(); ++node) {
       if (!fixed[index(node)]) movable_.push_back(node);
     }
   }
 
-  // The distortion of the quads around a node, were it at x: at each corner the
-  // mean of the squared sides over their aimed lengths, plus an area term, over
-  // the signed area, which is kept from zero by epsilon (Garanzha et al. 2021,
-  // "Foldover-free maps in 50 lines of code").
+  // The distortion of the quads around a node, were it at x: at each corner the mean of the squared
+  // sides over their aimed lengths, plus an area term, over the signed area, which is kept from
+  // zero by epsilon (Garanzha et al. 2021).
   struct Distortion {
     double value = 0;
     Vec3 gradient = Vec3::Zero();
     Mat3 hessian = Mat3::Zero();
+  };
+
+  // One corner of a quad: its sides e_u and e_v, and by how much of the node's move they grow.
+  struct Corner {
+    Vec3 eu, ev;
+    int su, sv;
+    double per_u, per_v;  // 1 over the squares of the aimed lengths
   };
 
   template <bool kWithDerivatives>
@@ -363,6 +237,8 @@ class Relaxation {
     Distortion sum;
     for (const int number : quads_at_[index(node)]) {
       const Quad& quad = quads_[index(number)];
+
+      // Areas are those seen along the mean of the target's normals, over what is aimed at.
       std::array<Vec3, 4> corner;
       Vec3 normal = Vec3::Zero();
       int mine = 0;
@@ -373,6 +249,7 @@ class Relaxation {
       }
       corner[index(mine)] = x;
       normal /= normal.norm() * quad.length_u * quad.length_v;
+
       const double per_u = 1 / (quad.length_u * quad.length_u);
       const double per_v = 1 / (quad.length_v * quad.length_v);
       for (const auto& [u0, u1, v0, v1] : kCorners) {
@@ -381,29 +258,37 @@ class Relaxation {
         if (su == 0 && sv == 0) continue;
         const Vec3 eu = corner[index(u1)] - corner[index(u0)];
         const Vec3 ev = corner[index(v1)] - corner[index(v0)];
-        const double area = normal.dot(eu.cross(ev));
-        const double root = std::sqrt(epsilon * epsilon + area * area);
-        const double chi = area > 0 ? (area + root) / 2 : epsilon * epsilon / (root - area) / 2;
-        const double top = (eu.squaredNorm() * per_u + ev.squaredNorm() * per_v) / 2 +
-                           options_.area_weight * (area * area + 1) / 2;
-        sum.value += top / chi;
-        if constexpr (kWithDerivatives) {
-          const double chi1 = (1 + area / root) / 2;
-          const double chi2 = epsilon * epsilon / (2 * root * root * root);
-          const Vec3 d_area = su * ev.cross(normal) + sv * normal.cross(eu);
-          const Vec3 d_sides = su * per_u * eu + sv * per_v * ev;
-          const Vec3 d_top = d_sides + options_.area_weight * area * d_area;
-          sum.gradient += d_top / chi - top * chi1 / (chi * chi) * d_area;
-          const double mixed = -chi1 / (chi * chi);
-          const double square =
-              options_.area_weight / chi + top * (2 * chi1 * chi1 / chi - chi2) / (chi * chi);
-          sum.hessian += square * d_area * d_area.transpose() +
-                         mixed * (d_top * d_area.transpose() + d_area * d_top.transpose());
-          sum.hessian.diagonal().array() += (su * su * per_u + sv * sv * per_v) / chi;
-        }
+        add_corner<kWithDerivatives>({eu, ev, su, sv, per_u, per_v}, normal, epsilon, sum);
       }
     }
     return sum;
+  }
+
+  // top / chi, chi(a) = (a + sqrt(epsilon^2 + a^2)) / 2 in place of the area a: positive even where
+  // the quad is turned over, so that a fold has a finite value and a way out.
+  template <bool kWithDerivatives>
+  void add_corner(const Corner& c, const Vec3& normal, double epsilon, Distortion& sum) const {
+    const double area = normal.dot(c.eu.cross(c.ev));
+    const double root = std::sqrt(epsilon * epsilon + area * area);
+    const double chi = area > 0 ? (area + root) / 2 : epsilon * epsilon / (root - area) / 2;
+    const double top = (c.eu.squaredNorm() * c.per_u + c.ev.squaredNorm() * c.per_v) / 2 +
+                       options_.area_weight * (area * area + 1) / 2;
+    sum.value += top / chi;
+    if constexpr (!kWithDerivatives) return;
+
+    const double chi1 = (1 + area / root) / 2;
+    const double chi2 = epsilon * epsilon / (2 * root * root * root);
+    const Vec3 d_area = c.su * c.ev.cross(normal) + c.sv * normal.cross(c.eu);
+    const Vec3 d_sides = c.su * c.per_u * c.eu + c.sv * c.per_v * c.ev;
+    const Vec3 d_top = d_sides + options_.area_weight * area * d_area;
+    sum.gradient += d_top / chi - top * chi1 / (chi * chi) * d_area;
+
+    const double mixed = -chi1 / (chi * chi);
+    const double square =
+        options_.area_weight / chi + top * (2 * chi1 * chi1 / chi - chi2) / (chi * chi);
+    sum.hessian += square * d_area * d_area.transpose() +
+                   mixed * (d_top * d_area.transpose() + d_area * d_top.transpose());
+    sum.hessian.diagonal().array() += (c.su * c.su * c.per_u + c.sv * c.sv * c.per_v) / chi;
   }
 
   // One Newton step in the tangent plane, shortened until it helps; its length
@@ -412,16 +297,21 @@ class Relaxation {
     const Vec3 x = nodes_.col(node);
     const Vec3 n = normals_.col(node);
     const Distortion now = distortion<true>(node, x, epsilon);
+
+    // The node stays on the target to first order: a problem in two unknowns.
     Eigen::Matrix<double, 3, 2> plane;
     plane.col(0) = n.unitOrthogonal();
     plane.col(1) = n.cross(plane.col(0));
     const Vec2 g = plane.transpose() * now.gradient;
     Eigen::Matrix2d H = plane.transpose() * now.hessian * plane;
+
     // The least shift that makes H safely positive definite.
     const double middle = H.trace() / 2;
     const double apart = std::hypot((H(0, 0) - H(1, 1)) / 2, H(0, 1));
-    const double shift = std::max(0.0, 0.05 * (std::abs(middle) + apart) - (middle - apart));
+    const double shift =
+        std::max(0.0, kLeastEigenvalue * (std::abs(middle) + apart) - (middle - apart));
     H.diagonal().array() += shift;
+
     Vec3 move = -(plane * H.inverse() * g);
     const double side = shortest_side(node);
     double length = move.norm() / side;
@@ -430,7 +320,8 @@ class Relaxation {
       move *= kLongestMove / length;
       length = kLongestMove;
     }
-    for (int attempt = 0; attempt < 4; ++attempt, move /= 3, length /= 3) {
+
+    for (int attempt = 0; attempt < kShortenings; ++attempt, move /= 3, length /= 3) {
       if (distortion<false>(node, x + move, epsilon).value < now.value) {
         step_back(node, x + move);
         return length;
@@ -467,22 +358,22 @@ JunctionLayout relaxed_layout(const JunctionTopology& topology, const JunctionTa
                               const std::vector<double>& distances, const LayoutOptions& options) {
   EXPECTS(distances.size() == topology.sectors.size());
   static_assert(kFine == 2 * kCoarse - 1);
-  std::vector<Crossing> crossings;
-  for (const JunctionSaddle& saddle : topology.saddles) {
-    crossings.push_back(crossing(topology, target, saddle, distances));
-  }
-  const std::vector<Vec3> poles = start_poles(topology, target, crossings);
-  Relaxation coarse(topology, target, options, kCoarse,
-                    start_openings(topology, target, poles, distances));
-  coarse.start(poles, crossings);
+  const LayoutStart begin = layout_start(topology, target, distances);
+
+  // On few nodes, where moves go far: folds come undone while epsilon is large, and as it falls
+  // distortion counts more and more for what it is.
+  Relaxation coarse(topology, target, options, kCoarse, begin.openings);
+  coarse.start(begin.poles, begin.crossings);
   coarse.set_lengths();
-  double epsilon = 0.5;
+  double epsilon = kFirstEpsilon;
   for (int k = 0; k < options.coarse_sweeps; ++k) {
     coarse.sweep(epsilon);
-    epsilon = std::max(kLeastEpsilon, 0.85 * epsilon);
-    if (k % 8 == 7 && options.follow > 0) coarse.follow_legs();
-    if (k % 10 == 9) coarse.set_lengths();
+    epsilon = std::max(kLeastEpsilon, kEpsilonFall * epsilon);
+    if (k % kFollowEvery == kFollowEvery - 1 && options.follow > 0) coarse.follow_legs();
+    if (k % kLengthsEvery == kLengthsEvery - 1) coarse.set_lengths();
   }
+
+  // On the nodes that the net is fitted to; openings stay as they are now.
   const JunctionLayout start = std::move(coarse).result();
   Relaxation fine(topology, target, options, kFine, start.openings);
   fine.start_from(start);

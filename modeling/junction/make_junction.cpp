@@ -12,6 +12,7 @@
 #include "modeling/junction/layout.h"
 #include "modeling/junction/plan_openings.h"
 #include "modeling/junction/quality.h"
+#include "modeling/junction/rules.h"
 #include "modeling/junction/smooth_junction.h"
 #include "modeling/junction/target.h"
 #include "modeling/junction/topology.h"
@@ -19,43 +20,7 @@
 namespace angiospline {
 namespace {
 
-// One set of choices; blend and rounding are relative to those of the plan, the
-// anchor to the usual one.
-struct Setting {
-  double blend = 1.0;
-  double rounding = 1.0;
-  double area_weight = 0.5;
-  double merge_deg = 5.0;
-  double follow = 0.5;
-  int sweeps = 60;
-  double anchor = 1.0;
-};
-
-constexpr std::array<Setting, 16> kLadder{{{1.0, 1.0, 0.5, 5.0, 0.5, 60, 1},
-                                           {1.0, 1.0, 0.5, 5.0, 0.5, 60, 10},
-                                           {1.5, 1.3, 0.5, 5.0, 0.5, 60, 0.1},
-                                           {2.0, 1.6, 0.5, 5.0, 0.5, 60, 3},
-                                           {3.0, 2.0, 0.5, 5.0, 0.5, 60, 1},
-                                           {1.5, 1.3, 0.5, 5.0, 0.0, 8, 1},
-                                           {1.0, 1.0, 1.5, 5.0, 0.5, 60, 1},
-                                           {1.0, 1.0, 0.5, 10.0, 0.5, 60, 3},
-                                           {1.0, 1.0, 0.5, 5.0, 0.0, 8, 3},
-                                           {1.5, 1.5, 0.2, 10.0, 0.0, 60, 1},
-                                           {0.7, 1.0, 1.0, 2.0, 0.5, 30, 3},
-                                           {1.0, 1.5, 0.1, 5.0, 0.5, 60, 1},
-                                           {2.0, 2.0, 0.5, 5.0, 0.0, 20, 10},
-                                           {1.5, 1.3, 1.5, 15.0, 0.5, 60, 1},
-                                           {1.2, 1.2, 0.5, 15.0, 0.0, 30, 3},
-                                           {0.8, 1.2, 1.5, 5.0, 0.0, 120, 1}}};
-// Curvature times smallest radius that is gentle enough; where many branches meet a try takes long.
-constexpr double kGentle = 8;
-constexpr double kGentleOfMany = 10;
-constexpr int kMoreTries = 4;  // for a fair surface that is sharper than its target
-// From so many branches on a setting takes half a second and more, mostly after all other junctions
-// of the tree: then two are tried at a time, and few more once one is fair.
-constexpr std::size_t kMany = 6;
-constexpr int kMoreTriesOfMany = 1;
-constexpr std::size_t kAtATime = 2;
+using namespace junction_rules;
 
 // What comes before the solve.
 struct Draft {
@@ -78,12 +43,12 @@ bool is_better(const JunctionQuality& a, const JunctionQuality& b) {
 }
 
 // They differ in the solve alone.
-bool share_draft(const Setting& a, const Setting& b) {
+bool share_draft(const LadderSetting& a, const LadderSetting& b) {
   return a.blend == b.blend && a.rounding == b.rounding && a.area_weight == b.area_weight &&
          a.merge_deg == b.merge_deg && a.follow == b.follow && a.sweeps == b.sweeps;
 }
 
-Draft make_draft(const OpeningPlan& plan, const Setting& setting) {
+Draft make_draft(const OpeningPlan& plan, const LadderSetting& setting) {
   JunctionTopology topology =
       junction_topology(plan.directions(), setting.merge_deg * std::numbers::pi / 180);
   JunctionTarget target(plan.branches, setting.blend * plan.blend,
@@ -96,7 +61,7 @@ Draft make_draft(const OpeningPlan& plan, const Setting& setting) {
   return {std::move(topology), std::move(target), std::move(layout)};
 }
 
-Attempt attempt(const Draft& draft, const Setting& setting, SmoothingWeights weights = {}) {
+Attempt attempt(const Draft& draft, const LadderSetting& setting, SmoothingWeights weights = {}) {
   weights.energy.anchor *= setting.anchor;
   SmoothedNet smooth = smooth_junction(draft.topology, draft.target, draft.layout, weights);
   const JunctionQuality quality = junction_quality(draft.topology, draft.target, smooth.net);
@@ -141,11 +106,15 @@ SurfaceNetwork make_network(const JunctionSpec& spec, const OpeningPlan& plan,
                             const JunctionTopology& topology, const JunctionNet& net) {
   SurfaceNetwork network;
   network.control_points_mm = (plan.unit_mm * net.points).colwise() + spec.center_mm;
+
   double smallest = spec.branches.front().radius_mm;
   for (const JunctionBranch& b : spec.branches) smallest = std::min(smallest, b.radius_mm);
   network.regions.push_back({"junction_" + spec.name, RegionKind::kJunction, smallest});
+
   const KnotVector knots = KnotVector::bezier(5);
   const SharedGrid grid(topology, 6);
+
+  // Each patch meets the next around its branch, and the one across its saddle, head to tail.
   for (int p = 0; p < static_cast<int>(topology.patches.size()); ++p) {
     Patch patch{knots, knots, {}, 0};
     for (int i = 0; i < 6; ++i) {
@@ -165,6 +134,7 @@ Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const At
                      int attempts) {
   Junction junction;
   junction.network = make_network(spec, plan, best.topology, best.net);
+
   for (std::size_t b = 0; b < spec.branches.size(); ++b) {
     const OpeningFrame& frame = best.openings[b];
     JunctionOpening opening;
@@ -175,6 +145,7 @@ Junction make_result(const JunctionSpec& spec, const OpeningPlan& plan, const At
     opening.patches = best.topology.sectors[b];
     junction.openings.push_back(std::move(opening));
   }
+
   junction.worst_angle_deg = best.quality.worst_angle_deg;
   junction.jacobian_ratio = best.quality.jacobian_ratio;
   junction.curvature_times_radius = best.quality.curvature_times_radius;
@@ -192,6 +163,7 @@ Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& 
   EXPECTS(options.settings > 0);
   const Result<OpeningPlan> plan = plan_openings(spec, options);
   if (!plan) return fail(plan.error());
+
   std::optional<Attempt> best;  // a fair one, otherwise a sound one, otherwise none
   std::string why;
   const bool many = spec.branches.size() >= kMany;
@@ -200,6 +172,8 @@ Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& 
   int count = 0;
   int more = many ? kMoreTriesOfMany : kMoreTries;
   const auto settings = std::min(kLadder.size(), static_cast<std::size_t>(options.settings));
+
+  // Down the ladder, until a further setting could hardly be better.
   for (std::size_t k = 0; k < settings; ++k) {
     if (progress.should_stop()) return fail(cancelled("junction " + spec.name));
     if (best && is_fair(best->quality) && more-- == 0) break;
@@ -211,6 +185,7 @@ Result<Junction> make_junction(const JunctionSpec& spec, const JunctionOptions& 
     }
     if (best && is_faithful(best->quality, most_curvature)) break;
   }
+
   if (best) return make_result(spec, *plan, *best, count);
   std::string names;
   for (const JunctionBranch& b : spec.branches) names += (names.empty() ? "" : ", ") + b.name;

@@ -7,11 +7,13 @@
 #include <Eigen/Dense>
 
 #include "base/contract.h"
+#include "modeling/junction/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kSamples = 24;
+using namespace junction_rules;
+
 using BernsteinRow = Eigen::Matrix<double, 6, 1>;
 
 BernsteinRow bernstein(double t) {
@@ -37,22 +39,28 @@ QuinticArc fit_arc(double angle, double speed_start, double speed_end, bool free
     c.col(4) = c.col(5) - speed_end / 5 * tangent(angle);
   };
   set_ends();
+
+  // Second differences from the circle's curvature: a quintic's c'' is 20 times those.
   c.col(2) = 2 * c.col(1) - c.col(0) - speed_start * speed_start / 20 * direction(0);
   c.col(3) = 2 * c.col(4) - c.col(5) - speed_end * speed_end / 20 * direction(angle);
+
   const int unknowns = free_speed ? 5 : 4;
-  for (int step = 0; step < 20; ++step) {
-    Eigen::MatrixXd J(kSamples + unknowns, unknowns);
-    Eigen::VectorXd residual(kSamples + unknowns);
-    for (int k = 0; k < kSamples; ++k) {
-      const BernsteinRow b = bernstein((k + 0.5) / kSamples);
+
+  // Gauss-Newton on (|p|^2 - 1) / 2, whose derivative by p is p.
+  for (int step = 0; step < kArcSteps; ++step) {
+    Eigen::MatrixXd J(kArcSamples + unknowns, unknowns);
+    Eigen::VectorXd residual(kArcSamples + unknowns);
+    for (int k = 0; k < kArcSamples; ++k) {
+      const BernsteinRow b = bernstein((k + 0.5) / kArcSamples);
       const Eigen::Vector2d p = c * b;
       residual(k) = (p.squaredNorm() - 1) / 2;
       J.row(k).head<4>() << b(2) * p.x(), b(2) * p.y(), b(3) * p.x(), b(3) * p.y();
       if (free_speed) J(k, 4) = p.dot(b(1) * tangent(0) - b(4) * tangent(angle)) / 5;
     }
     // Sliding along the circle is nearly free: a little damping keeps the step short.
-    J.bottomRows(unknowns) = 1e-5 * Eigen::MatrixXd::Identity(unknowns, unknowns);
+    J.bottomRows(unknowns) = kArcDamping * Eigen::MatrixXd::Identity(unknowns, unknowns);
     residual.tail(unknowns).setZero();
+
     const Eigen::VectorXd move = -J.householderQr().solve(residual);
     c.col(2) += move.head<2>();
     c.col(3) += move.segment<2>(2);
@@ -83,6 +91,8 @@ std::vector<QuinticArc> opening_arcs(const std::vector<double>& seams) {
     EXPECTS(angle[k] > 0);
     speed[k] = best_speed(angle[k]);
   }
+
+  // Neighbours agree on the derivative at their seam: the mean of what either would choose.
   std::vector<QuinticArc> arcs;
   for (std::size_t k = 0; k < count; ++k) {
     const double start = (speed[(k + count - 1) % count] + speed[k]) / 2;

@@ -10,18 +10,12 @@
 #include <fmt/core.h>
 
 #include "base/index.h"
+#include "modeling/junction/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kLargestShare = 0.05;  // of the other branches at an opening's circle
-constexpr double kLeastMargin = 0.3;    // radii
-constexpr double kLeastAngleRad = 1.0 * std::numbers::pi / 180;
-constexpr double kUnitTolerance = 1e-6;  // of a direction's length
-constexpr int kCirclePoints = 24;
-constexpr int kHalvings = 18;  // of the way between too near and far enough
-constexpr double kReach = 4;   // largest radii at which directions of offset branches are compared
-constexpr std::size_t kMostBranches = 24;  // what JunctionTarget holds
+using namespace junction_rules;
 
 std::string junction_name(const JunctionSpec& spec) {
   return spec.name.empty() ? "junction" : "junction " + spec.name;
@@ -38,11 +32,13 @@ std::optional<Error> find_branch_defect(const JunctionSpec& spec, std::size_t b)
     return Error{ErrorKind::kBadInput, "radius is not positive", where,
                  fmt::format("{}", branch.radius_mm), "radii are positive and finite"};
   }
+
   const double length = branch.direction.norm();
   if (!(std::abs(length - 1) <= kUnitTolerance)) {
     return Error{ErrorKind::kBadInput, "direction is not a unit vector", where,
                  fmt::format("length {}", length), "directions have length 1"};
   }
+
   if (!branch.offset_mm.allFinite()) {
     return Error{ErrorKind::kBadInput, "offset is not finite", where, {}, {}};
   }
@@ -64,18 +60,22 @@ std::optional<Error> find_spec_defect(const JunctionSpec& spec) {
     return Error{ErrorKind::kBadInput, "too few branches for a junction", junction_name(spec),
                  fmt::format("{}", spec.branches.size()), "a junction has three or more"};
   }
-  if (spec.branches.size() > kMostBranches) {
+  if (spec.branches.size() > kMostRays) {
     return Error{ErrorKind::kBadInput, "too many branches for a junction", junction_name(spec),
-                 fmt::format("{}", spec.branches.size()), fmt::format("at most {}", kMostBranches)};
+                 fmt::format("{}", spec.branches.size()), fmt::format("at most {}", kMostRays)};
   }
   if (!spec.center_mm.allFinite()) {
     return Error{ErrorKind::kBadInput, "centre is not finite", junction_name(spec), {}, {}};
   }
+
   for (std::size_t b = 0; b < spec.branches.size(); ++b) {
     if (auto error = find_branch_defect(spec, b)) return error;
   }
+
+  // Branches that begin beside the centre may be parallel and yet go different ways.
   double reach = 0;
-  for (const JunctionBranch& b : spec.branches) reach = std::max(reach, kReach * b.radius_mm);
+  for (const JunctionBranch& b : spec.branches)
+    reach = std::max(reach, kDirectionReach * b.radius_mm);
   for (std::size_t a = 0; a < spec.branches.size(); ++a) {
     for (std::size_t b = a + 1; b < spec.branches.size(); ++b) {
       const Vec3 d = seen_from_center(spec.branches[a], reach);
@@ -142,7 +142,7 @@ double blend_end(const JunctionTarget& target, int b) {
   while (circle.is_too_near(far)) far *= 2;
   if (far == radius) return far;
   double near = far / 2;
-  for (int k = 0; k < kHalvings; ++k) {
+  for (int k = 0; k < kOpeningHalvings; ++k) {
     const double middle = (near + far) / 2;
     (circle.is_too_near(middle) ? near : far) = middle;
   }
@@ -167,14 +167,17 @@ std::vector<Vec3> OpeningPlan::directions() const {
 Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOptions& options) {
   if (auto error = find_spec_defect(spec)) return fail(*error);
   OpeningPlan plan;
+
   plan.unit_mm = 0;
   for (const JunctionBranch& b : spec.branches) plan.unit_mm = std::max(plan.unit_mm, b.radius_mm);
   for (const JunctionBranch& b : spec.branches) {
     plan.branches.push_back(
         {b.direction.normalized(), b.radius_mm / plan.unit_mm, b.offset_mm / plan.unit_mm, 0.0});
   }
+
+  // With all of the blend, then with less of it.
   Error too_short;
-  for (const double part : {1.0, 0.75, 0.5, 1.0 / 3}) {
+  for (const double part : kBlendParts) {
     plan.blend = part * options.blend;
     plan.rounding = part * options.rounding;
     plan.distances.clear();
@@ -187,6 +190,7 @@ Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOption
       const double longest =
           along_branch(branch.start, branch.direction, spec.branches[b].longest_mm / plan.unit_mm);
       double distance = end + options.margin * r;
+
       if (spec.branches[b].longest_mm > 0) distance = std::min(distance, longest);
       if (distance < end + std::min(kLeastMargin, options.margin) * r) {
         fits = false;
@@ -196,8 +200,10 @@ Result<OpeningPlan> plan_openings(const JunctionSpec& spec, const JunctionOption
             fmt::format("{:.4g} mm", spec.branches[b].longest_mm),
             fmt::format("at least {:.4g} mm are needed", (end + kLeastMargin * r) * plan.unit_mm)};
       }
+
       plan.distances.push_back(distance);
     }
+
     if (fits) return plan;
   }
   return fail(too_short);

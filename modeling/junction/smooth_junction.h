@@ -3,6 +3,7 @@
 #pragma once
 
 #include "modeling/junction/layout.h"
+#include "modeling/junction/patch_solver.h"
 #include "modeling/junction/tangent_plane_rows.h"
 #include "modeling/junction/target.h"
 #include "modeling/junction/target_energy.h"
@@ -13,12 +14,10 @@ namespace angiospline {
 
 struct SmoothingWeights {
   EnergyWeights energy;
-  double proximal = 0.05;      // squared step of every control point, in local radii
-  double longest_step = 0.3;   // of any control point, in local radii
-  int fit_steps = 2;           // to the layout
-  int free_steps = 3;          // to the target, without continuity
-  int most_steps = 12;         // to the target under continuity
-  int most_polish_steps = 10;  // on continuity alone
+  PatchSolverOptions solver;
+  int fit_steps = 2;             // to the layout
+  int free_steps = 3;            // to the target, without continuity
+  ConstrainedSteps constrained;  // to the target under continuity, then on continuity alone
   EdgeDegrees degrees;
 };
 
@@ -30,9 +29,9 @@ struct SmoothedNet {
 };
 
 // Minimises the target's energy under F' + rho G' = nu H' on all inner edges by sequential
-// quadratic programming with Gauss-Newton Hessians, then takes least-norm steps on the equations
-// alone, which converge quadratically. Whether the result is a fair surface is for the quality
-// gates to say.
+// quadratic programming with Gauss-Newton Hessians (modeling/junction/patch_solver.h), then takes
+// least-norm steps on the equations alone, which converge quadratically. Whether the result is a
+// fair surface is for the quality gates to say.
 SmoothedNet smooth_junction(const JunctionTopology& topology, const JunctionTarget& target,
                             const JunctionLayout& layout, const SmoothingWeights& weights = {});
 

@@ -55,11 +55,15 @@ EdgePoints gather(const SmoothEdge& edge, const JunctionNet& net) {
 Vec3 coefficient(const SmoothEdge& edge, const EdgePoints& p, const Cofactors& c, int k) {
   const int m = edge.ratio_degree;
   Vec3 sum = Vec3::Zero();
+
+  // Products of Bernstein forms: coefficient k gathers the pairs whose indices add up to k (Farouki
+  // & Rajan: Algorithms for polynomials in Bernstein form, CAGD 5, 1988).
   for (int i = 0; i <= kDegree; ++i) {
     if (k - i < 0 || k - i > m) continue;
     const double w = product_weight(m, k - i, kDegree, i);
     sum += w * (p.f[index(i)] + c.rho[index(k - i)] * p.g[index(i)]);
   }
+
   for (int i = 0; i < kDegree; ++i) {
     if (k - i < 0 || k - i > m + 1) continue;
     const double w = product_weight(m + 1, k - i, kDegree - 1, i);
@@ -81,6 +85,118 @@ void each_group(const SmoothEdge& edge, Use&& use) {
   }
 }
 
+// Writes the Jacobian's entries of one edge, one equation group at a time.
+class RowWriter {
+ public:
+  RowWriter(const SmoothEdge& edge, const JunctionNet& net, std::vector<JacobianEntry>& entries)
+      : edge_(edge), net_(net), entries_(entries) {}
+
+  void start_group(int row, bool scalar) {
+    row_ = row;
+    scalar_ = scalar;
+  }
+
+  // The group's derivative by an unknown is the vector v.
+  void put_vector(int column, const Vec3& v) {
+    if (scalar_) {
+      entries_.push_back({row_, column, edge_.axis.dot(v)});
+    } else {
+      for (int d = 0; d < 3; ++d) entries_.push_back({row_ + d, column, v(d)});
+    }
+  }
+
+  // The group contains `weight` times this control point.
+  void put_point(int id, double weight) {
+    const ControlSlot& slot = net_.slots[index(id)];
+    if (slot.count == 1) put_vector(slot.first, weight * slot.along);
+    if (slot.count != 3) return;
+    for (int d = 0; d < 3; ++d) {
+      entries_.push_back(
+          {scalar_ ? row_ : row_ + d, slot.first + d, scalar_ ? weight * edge_.axis(d) : weight});
+    }
+  }
+
+ private:
+  const SmoothEdge& edge_;
+  const JunctionNet& net_;
+  std::vector<JacobianEntry>& entries_;
+  int row_ = 0;
+  bool scalar_ = false;
+};
+
+// What the edge's own control points get in one group, gathered before it is written: each of them
+// occurs in F, G and H'.
+struct OnEdge {
+  std::array<double, 6> weight{};
+  std::array<bool, 6> used{};
+};
+
+// One edge's part of the Jacobian. f_i, g_i are the differences of the rows beside the edge from
+// it, so that each of them takes its weight from h_i too.
+class EdgeJacobian {
+ public:
+  EdgeJacobian(const SmoothEdge& edge, const JunctionNet& net, const Eigen::VectorXd& coefficients,
+               std::vector<JacobianEntry>& entries)
+      : edge_(edge),
+        p_(gather(edge, net)),
+        c_(cofactors(edge, coefficients)),
+        writer_(edge, net, entries),
+        rho_column_(net.unknowns + edge.first_coefficient - (edge.from_opening ? 2 : 0)),
+        nu_column_(net.unknowns + edge.first_coefficient + edge.ratio_unknowns() -
+                   (edge.from_opening ? 1 : 0)) {}
+
+  void write_group(int k, int row, bool scalar) {
+    writer_.start_group(row, scalar);
+    OnEdge h;
+    on_f_g(k, h);
+    on_nu(k, h);
+    for (int i = 0; i <= kDegree; ++i) {
+      if (h.used[index(i)]) writer_.put_point(edge_.h[index(i)], h.weight[index(i)]);
+    }
+  }
+
+ private:
+  // sum_i w (f_i + rho_j g_i), j = k - i
+  void on_f_g(int k, OnEdge& h) {
+    const int m = edge_.ratio_degree;
+    for (int i = 0; i <= kDegree; ++i) {
+      const int j = k - i;
+      if (j < 0 || j > m) continue;
+      const double w = product_weight(m, j, kDegree, i) / edge_.scale;
+      writer_.put_point(edge_.f[index(i)], w);
+      writer_.put_point(edge_.g[index(i)], w * c_.rho[index(j)]);
+      h.weight[index(i)] -= w * (1 + c_.rho[index(j)]);
+      h.used[index(i)] = true;
+      // rho_0 and rho_1 are fixed on an edge from an opening.
+      if (!edge_.from_opening || j >= 2) writer_.put_vector(rho_column_ + j, w * p_.g[index(i)]);
+    }
+  }
+
+  // - sum_i w nu_j (h_{i+1} - h_i), j = k - i
+  void on_nu(int k, OnEdge& h) {
+    const int m = edge_.ratio_degree;
+    for (int i = 0; i < kDegree; ++i) {
+      const int j = k - i;
+      if (j < 0 || j > m + 1) continue;
+      const double w = product_weight(m + 1, j, kDegree - 1, i) / edge_.scale;
+      h.weight[index(i)] += w * c_.nu[index(j)];
+      h.weight[index(i + 1)] -= w * c_.nu[index(j)];
+      h.used[index(i)] = h.used[index(i + 1)] = true;
+      // nu_0 is fixed on an edge from an opening.
+      if (!edge_.from_opening || j >= 1) {
+        writer_.put_vector(nu_column_ + j, -w * (p_.h[index(i + 1)] - p_.h[index(i)]));
+      }
+    }
+  }
+
+  const SmoothEdge& edge_;
+  EdgePoints p_;
+  Cofactors c_;
+  RowWriter writer_;
+  int rho_column_;
+  int nu_column_;
+};
+
 }  // namespace
 
 SmoothEdges smooth_edges(const JunctionTopology& topology, const JunctionLayout& layout,
@@ -96,6 +212,8 @@ SmoothEdges smooth_edges(const JunctionTopology& topology, const JunctionLayout&
     all.rows += edge.row_count();
     all.edges.push_back(edge);
   };
+
+  // Legs run from an opening to a pole, between two patches of one branch.
   const int legs = degrees.leg > 0 ? static_cast<int>(topology.patches.size()) : 0;
   for (int p = 0; p < legs; ++p) {
     const JunctionPatch& patch = topology.patches[index(p)];
@@ -110,6 +228,8 @@ SmoothEdges smooth_edges(const JunctionTopology& topology, const JunctionLayout&
     }
     add(edge);
   }
+
+  // Saddles run from pole to pole, between patches of two branches; their u = 1 sides are opposed.
   for (const JunctionSaddle& saddle : topology.saddles) {
     SmoothEdge edge;
     edge.ratio_degree = degrees.saddle;
@@ -134,6 +254,8 @@ Eigen::VectorXd best_coefficients(const SmoothEdges& edges, const JunctionNet& n
       for (int k = 0; k <= last; ++k) value.segment<3>(3 * k) = coefficient(edge, p, c, k);
       return value;
     };
+
+    // The left-hand side is affine in the coefficients: its columns are differences.
     const Eigen::VectorXd base = stacked(x);
     Eigen::MatrixXd A(base.size(), edge.coefficient_count());
     for (int k = 0; k < edge.coefficient_count(); ++k) {
@@ -153,6 +275,7 @@ Eigen::VectorXd tangent_plane_residual(const SmoothEdges& edges, const JunctionN
   for (const SmoothEdge& edge : edges.edges) {
     const EdgePoints p = gather(edge, net);
     const Cofactors c = cofactors(edge, coefficients);
+
     each_group(edge, [&](int k, int row, bool scalar) {
       const Vec3 value = coefficient(edge, p, c, k) / edge.scale;
       if (scalar) {
@@ -170,57 +293,8 @@ void tangent_plane_jacobian(const SmoothEdges& edges, const JunctionNet& net,
                             std::vector<JacobianEntry>& entries) {
   entries.clear();
   for (const SmoothEdge& edge : edges.edges) {
-    const EdgePoints p = gather(edge, net);
-    const Cofactors c = cofactors(edge, coefficients);
-    const int m = edge.ratio_degree;
-    const auto put_vector = [&](int row, bool scalar, int column, const Vec3& v) {
-      if (scalar) {
-        entries.push_back({row, column, edge.axis.dot(v)});
-      } else {
-        for (int d = 0; d < 3; ++d) entries.push_back({row + d, column, v(d)});
-      }
-    };
-    const auto put_point = [&](int row, bool scalar, int id, double weight) {
-      const ControlSlot& slot = net.slots[index(id)];
-      if (slot.count == 1) put_vector(row, scalar, slot.first, weight * slot.along);
-      if (slot.count != 3) return;
-      for (int d = 0; d < 3; ++d) {
-        entries.push_back(
-            {scalar ? row : row + d, slot.first + d, scalar ? weight * edge.axis(d) : weight});
-      }
-    };
-    const int rho_column = net.unknowns + edge.first_coefficient - (edge.from_opening ? 2 : 0);
-    const int nu_column =
-        net.unknowns + edge.first_coefficient + edge.ratio_unknowns() - (edge.from_opening ? 1 : 0);
-    each_group(edge, [&](int k, int row, bool scalar) {
-      std::array<double, 6> on_h{};
-      std::array<bool, 6> uses_h{};
-      for (int i = 0; i <= kDegree; ++i) {
-        const int j = k - i;
-        if (j < 0 || j > m) continue;
-        const double w = product_weight(m, j, kDegree, i) / edge.scale;
-        put_point(row, scalar, edge.f[index(i)], w);
-        put_point(row, scalar, edge.g[index(i)], w * c.rho[index(j)]);
-        on_h[index(i)] -= w * (1 + c.rho[index(j)]);
-        uses_h[index(i)] = true;
-        if (!edge.from_opening || j >= 2)
-          put_vector(row, scalar, rho_column + j, w * p.g[index(i)]);
-      }
-      for (int i = 0; i < kDegree; ++i) {
-        const int j = k - i;
-        if (j < 0 || j > m + 1) continue;
-        const double w = product_weight(m + 1, j, kDegree - 1, i) / edge.scale;
-        on_h[index(i)] += w * c.nu[index(j)];
-        on_h[index(i + 1)] -= w * c.nu[index(j)];
-        uses_h[index(i)] = uses_h[index(i + 1)] = true;
-        if (!edge.from_opening || j >= 1) {
-          put_vector(row, scalar, nu_column + j, -w * (p.h[index(i + 1)] - p.h[index(i)]));
-        }
-      }
-      for (int i = 0; i <= kDegree; ++i) {
-        if (uses_h[index(i)]) put_point(row, scalar, edge.h[index(i)], on_h[index(i)]);
-      }
-    });
+    EdgeJacobian jacobian(edge, net, coefficients, entries);
+    each_group(edge, [&](int k, int row, bool scalar) { jacobian.write_group(k, row, scalar); });
   }
 }
 

@@ -11,32 +11,14 @@
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
+#include "modeling/junction/rules.h"
 
 namespace angiospline {
 namespace {
 
-// Branches whose distance exceeds the least one by this many widths are lost in
-// the sum.
-constexpr double kNegligible = 20.0;
-// The ray's start is rounded over this part of the radius, so that gradients
-// have no kinks.
-constexpr double kRoundedStart = 0.25;
-// Pairs at this angle or less have the rounding asked for, at kWide or more 1 +
-// kRounder times it.
-constexpr double kAcute = 30 * std::numbers::pi / 180;
-constexpr double kWide = 50 * std::numbers::pi / 180;
-constexpr double kRounder = 0.8;
-// The crotch fills up by log 2 times the width: this leaves it within half the smallest radius of
-// the cylinders. Where the smallest is a twig, a width of kNarrow of the pair's own radius is kept.
-constexpr double kWidest = 0.6;
-constexpr double kNarrow = 0.15;
-constexpr std::size_t kMostRays = 24;
+using namespace junction_rules;
+
 constexpr std::size_t kMostActive = 2 * kMostRays;  // with a core for each
-constexpr double kSameStart = 0.05;                 // radii between starts that share a core
-constexpr double kDisagreement = 1.02;  // minus the agreement: a pair's weight in the mean width
-constexpr double kLeastRayStep = 0.01;  // towards the surface from outside, of the whole way
-constexpr int kHalvings = 30;           // of the step that came to be inside
-constexpr double kVanishing = 1e-290;   // sums of weights below this are lost
 
 // Distance to a ray capsule and its gradient. Its second derivative is
 // (I + bend d d' - gradient gradient') / length, d the branch's direction.
@@ -63,12 +45,14 @@ Distance capsule(const TargetBranch& branch, const Vec3& place) {
   const double y = d.dot(x);
   const double e = kRoundedStart * branch.radius;
   auto [along, slope, bend] = ramp(y, e);
+
   if (branch.length > 0) {
     const Ramp beyond = ramp(y - branch.length, e);
     along -= beyond.value;
     slope -= beyond.slope;
     bend -= beyond.bend;
   }
+
   const Vec3 away = x - along * d;
   const double length = std::max(away.norm(), 1e-9 * branch.radius);
   const double off = d.dot(away);  // y - along <= 0
@@ -112,10 +96,13 @@ using Square = std::array<double, kMostActive * kMostActive>;
 JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend, double rounding)
     : branches_(std::move(branches)) {
   EXPECTS(!branches_.empty() && branches_.size() <= kMostRays);
+
   rays_ = branches_.size();
   double smallest = branches_.front().radius;
   for (const TargetBranch& ray : branches_) smallest = std::min(smallest, ray.radius);
   add_cores();
+
+  // The width of each pair: how far its crotch is filled.
   const Eigen::Index n = static_cast<Eigen::Index>(branches_.size());
   widths_.resize(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -124,11 +111,14 @@ JunctionTarget::JunctionTarget(std::vector<TargetBranch> branches, double blend,
       const TargetBranch& b = branches_[static_cast<std::size_t>(j)];
       const double r = std::min(a.radius, b.radius);
       widths_(i, j) = blend * r;
+
       // A core and what leaves it make no crotch of their own.
       if (i == j || a.length > 0 || b.length > 0) continue;
+
       // A crotch of half angle h has curvature cos^2 h / (k sin h).
       const double half = std::acos(std::clamp(a.direction.dot(b.direction), -1.0, 1.0)) / 2;
       const double cosine = std::cos(half);
+
       // Wide pairs have the room for a rounder one.
       const double wide = std::clamp((2 * half - kAcute) / (kWide - kAcute), 0.0, 1.0);
       const double radius = (1 + kRounder * wide) * rounding * r;
@@ -145,12 +135,15 @@ void JunctionTarget::add_cores() {
     const TargetBranch ray = branches_[i];
     const double length = ray.start.norm();
     if (!(length > kSameStart * ray.radius)) continue;
+
+    // Rays that start together share a core.
     std::size_t core = rays_;
     while (core < branches_.size() &&
            (branches_[core].length * branches_[core].direction - ray.start).norm() >
                kSameStart * ray.radius) {
       ++core;
     }
+
     core_of_[i] = core;
     if (core == branches_.size()) {
       branches_.push_back({ray.start / length, ray.radius, Vec3::Zero(), length});
@@ -177,12 +170,14 @@ void JunctionTarget::find_near(const Vec3& x, Near& near) const {
     value[i] = capsule_value(branches_[i], x);
     near.least = std::min(near.least, value[i]);
   }
+
   near.count = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (value[i] - near.least > kNegligible * widest_[i]) continue;
     near.branch[near.count] = i;
     near.distance[near.count++] = capsule(branches_[i], x);
   }
+
   for (std::size_t a = 0; a < near.count; ++a) {
     for (std::size_t b = a + 1; b < near.count; ++b) {
       near.agreement[a * near.count + b] = near.agreement[b * near.count + a] =
@@ -203,6 +198,7 @@ double JunctionTarget::width(const Near& near, double per_k, double* on_distance
                    static_cast<Eigen::Index>(near.branch[b]));
   };
   if (m == 2) return pair_width(0, 1);
+
   Square weight;
   double top = 0, bottom = 0;
   for (std::size_t a = 0; a < m; ++a) {
@@ -216,6 +212,7 @@ double JunctionTarget::width(const Near& near, double per_k, double* on_distance
       bottom += weight[a * m + b];
     }
   }
+
   if (!(bottom > kVanishing)) return 0;
   const double k = top / bottom;
   if (per_k == 0) return k;
@@ -233,19 +230,40 @@ double JunctionTarget::width(const Near& near, double per_k, double* on_distance
   return k;
 }
 
+// From derivatives by distances and agreements (upper triangle) to the gradient.
+Vec3 JunctionTarget::gradient(const Near& near, const double* on_distance,
+                              const double* on_agreement) const {
+  const std::size_t m = near.count;
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t a = 0; a < m; ++a) {
+    sum += on_distance[a] * near.distance[a].gradient;
+    for (std::size_t b = a + 1; b < m; ++b) {
+      if (near.agreement[a * m + b] == 0) continue;
+      sum += on_agreement[a * m + b] *
+             agreement_gradient(near.distance[a], branches_[near.branch[a]].direction,
+                                near.distance[b], branches_[near.branch[b]].direction);
+    }
+  }
+  return sum;
+}
+
 // Derivatives go backwards: from the value to distances and agreements, then to
 // the gradient.
 JunctionTarget::Value JunctionTarget::at(const Vec3& x) const {
   Near near;
   find_near(x, near);
   const std::size_t m = near.count;
+
   if (m == 1) {
     const auto own = static_cast<Eigen::Index>(near.branch[0]);
     const double k = widths_(own, own);
     return {near.distance[0].value / k, near.distance[0].gradient / k};
   }
+
   const double k = width(near, 0, nullptr, nullptr);
   if (!(k > 0)) return {near.least / widths_(0, 0), near.distance[0].gradient / widths_(0, 0)};
+
+  // sum_a w_a^2 / sum_b c_ab w_b, with w scaled by the largest of them.
   std::array<double, kMostActive> w, share, on_distance;
   double sum = 0;
   for (std::size_t a = 0; a < m; ++a) w[a] = std::exp(-(near.distance[a].value - near.least) / k);
@@ -255,6 +273,7 @@ JunctionTarget::Value JunctionTarget::at(const Vec3& x) const {
     share[a] = w[a] > 0 ? w[a] / mixed : 0;
     sum += w[a] * share[a];
   }
+
   // The value is least / k - log(sum), with `least` held while the terms were
   // scaled.
   double per_k = -near.least / (k * k);
@@ -270,18 +289,10 @@ JunctionTarget::Value JunctionTarget::at(const Vec3& x) const {
     on_distance[a] = -per_exponent / k;
     per_k += per_exponent * (near.distance[a].value - near.least) / (k * k);
   }
+
   if (m > 2) width(near, per_k, on_distance.data(), on_agreement.data());
-  Vec3 gradient = Vec3::Zero();
-  for (std::size_t a = 0; a < m; ++a) {
-    gradient += on_distance[a] * near.distance[a].gradient;
-    for (std::size_t b = a + 1; b < m; ++b) {
-      if (near.agreement[a * m + b] == 0) continue;
-      gradient += on_agreement[a * m + b] *
-                  agreement_gradient(near.distance[a], branches_[near.branch[a]].direction,
-                                     near.distance[b], branches_[near.branch[b]].direction);
-    }
-  }
-  return {near.least / k - std::log(sum), gradient};
+
+  return {near.least / k - std::log(sum), gradient(near, on_distance.data(), on_agreement.data())};
 }
 
 JunctionTarget::Foot JunctionTarget::foot(const Vec3& x) const {
@@ -293,6 +304,7 @@ JunctionTarget::Foot JunctionTarget::foot(const Vec3& x) const {
 Vec3 JunctionTarget::outermost_on_ray(const Vec3& w, double longest) const {
   double outside = longest;
   double t = longest;
+
   double distance = foot(t * w).distance;
   if (distance <= 0) return longest * w;
   while (distance > 0 && t > 0) {
@@ -300,8 +312,10 @@ Vec3 JunctionTarget::outermost_on_ray(const Vec3& w, double longest) const {
     t = std::max(0.0, t - std::max(distance, kLeastRayStep * longest));
     distance = foot(t * w).distance;
   }
+
+  // Bisection between the last two.
   double inside = t;
-  for (int k = 0; k < kHalvings; ++k) {
+  for (int k = 0; k < kRayHalvings; ++k) {
     const double middle = (inside + outside) / 2;
     (foot(middle * w).distance > 0 ? outside : inside) = middle;
   }
@@ -320,6 +334,8 @@ Vec3 JunctionTarget::on_ray(const Vec3& w, double longest) const {
                                                           : longest;
     t = std::max(t, reach);
   }
+
+  // Newton's method along the ray, no step longer than a fifth of the way.
   for (int step = 0; step < 30 && t < longest; ++step) {
     const Value v = at(t * w);
     const double slope = v.gradient.dot(w);

@@ -68,6 +68,7 @@ class JunctionTarget {
   Vec3 outermost_on_ray(const Vec3& w, double longest) const;
   struct Near;
   void find_near(const Vec3& x, Near& near) const;
+  Vec3 gradient(const Near& near, const double* on_distance, const double* on_agreement) const;
   double width(const Near& near, double per_k, double* on_distance, double* on_agreement) const;
 
   std::vector<TargetBranch> branches_;

@@ -7,6 +7,8 @@
 #include <Eigen/Core>
 
 #include "modeling/junction/layout.h"
+#include "modeling/junction/patch_basis.h"
+#include "modeling/junction/patch_solver.h"
 #include "modeling/junction/target.h"
 #include "modeling/junction/topology.h"
 #include "modeling/junction/unknowns.h"
@@ -22,32 +24,41 @@ struct EnergyWeights {
   double pole = 4.0;         // of samples beside a pole, against 1 elsewhere
 };
 
-// Weights for fitting the layout itself.
-inline constexpr EnergyWeights kFitWeights{0.0, 0.1, 1.0, 0.001, 1.0};
-
-// The unknowns a patch depends on, and its share of the Hessian (lower triangle) and gradient.
-struct PatchModel {
-  std::vector<int> unknowns;
-  Eigen::MatrixXd hessian;
-  Eigen::VectorXd gradient;
-};
-
-// The Gauss-Newton models of all patches: normals and tangent lengths are held at their current
-// values. Where the weight of the distance is zero the normals are the layout's and the target is
-// not evaluated; it may be null then.
+// The Gauss-Newton models of all patches (Nocedal & Wright: Numerical Optimization, 10.3): normals
+// and tangent lengths are held at their current values, so that every term is the square of a
+// function linear in the control points. Where the weight of the distance is zero the normals are
+// the layout's and the target is not evaluated; it may be null then. Target and layout must outlive
+// it.
 class TargetEnergy {
  public:
   TargetEnergy(const JunctionTopology& topology, const JunctionTarget* target,
                const JunctionLayout& layout, const JunctionNet& net);
 
-  int patches() const { return static_cast<int>(models_.size()); }
-  const PatchModel& model(int patch) const { return models_[static_cast<std::size_t>(patch)]; }
+  // One a patch; empty but for their unknowns before the first update.
+  const std::vector<PatchModel>& models() const { return models_; }
 
-  // Fills the models at the net's current points.
-  void update(const JunctionNet& net, const EnergyWeights& weights);
+  // The models at the net's current points. O(patches * samples).
+  const std::vector<PatchModel>& updated(const JunctionNet& net, const EnergyWeights& weights);
 
  private:
-  void update_patch(int patch, const JunctionNet& net, const EnergyWeights& weights);
+  // What one patch is asked for at its samples: rows of a linear least squares problem along the
+  // target's normals, and what it is anchored to.
+  struct SampleRows {
+    Eigen::MatrixXd basis;      // 36 x 3 samples: of distance, Su and Sv, scaled as the residuals
+    Eigen::VectorXd residual;   // 3 samples
+    Eigen::Matrix3Xd normals;   // the direction of all three rows of a sample
+    Eigen::Matrix3Xd anchors;   // the layout's nodes
+    Eigen::VectorXd on_anchor;  // weights of the squared distances from them
+  };
+
+  void tabulate_samples();
+  void set_scales(const JunctionTopology& topology, int patch);
+  void set_unknowns(const JunctionNet& net, int patch);
+
+  SampleRows sample_rows(int patch, const PatchNet& P, const EnergyWeights& weights) const;
+  void project_on_unknowns(int patch, const JunctionNet& net, const SampleRows& rows);
+  void add_isotropic(int patch, const JunctionNet& net, const PatchNet& P, const SampleRows& rows,
+                     double roughness);
 
   const JunctionTarget* target_;
   const JunctionLayout& layout_;

@@ -42,7 +42,8 @@ Polygon sorted_around(const std::vector<Vec3>& d, const Vec3& normal) {
     order[i] = static_cast<int>(i);
     angle[i] = std::atan2(y.dot(d[i] - middle), x.dot(d[i] - middle));
   }
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return angle[index(a)] < angle[index(b)]; });
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return angle[index(a)] < angle[index(b)]; });
   return order;
 }
 
@@ -59,8 +60,10 @@ std::vector<Face> triangle_hull(const std::vector<Vec3>& d, const std::array<int
       face = make_face(d, c[0], c[2], c[1]);
     faces.push_back(face);
   }
+
   for (int p = 0; p < static_cast<int>(d.size()); ++p) {
     if (std::find(first.begin(), first.end(), p) != first.end()) continue;
+
     std::vector<Face> kept;
     std::vector<DirectedEdge> open;
     for (const Face& face : faces) {
@@ -71,11 +74,14 @@ std::vector<Face> triangle_hull(const std::vector<Vec3>& d, const std::array<int
       for (int k = 0; k < 3; ++k)
         open.emplace_back(face.corners[index(k)], face.corners[index((k + 1) % 3)]);
     }
+
+    // Edges that occur in one direction alone are the horizon.
     for (const auto& [a, b] : open) {
       if (std::find(open.begin(), open.end(), DirectedEdge{b, a}) == open.end()) {
         kept.push_back(make_face(d, a, b, p));
       }
     }
+
     faces = std::move(kept);
   }
   return faces;
@@ -91,6 +97,7 @@ std::pair<std::array<int, 4>, double> first_tetrahedron(const std::vector<Vec3>&
     }
     return best;
   };
+
   const int a = 0;
   const int b = farthest([&](int i) { return (d[index(i)] - d[index(a)]).norm(); });
   const Vec3 line = (d[index(b)] - d[index(a)]).normalized();
@@ -111,9 +118,11 @@ std::vector<MergedFace> merged_faces(const std::vector<Face>& faces, double merg
   std::map<DirectedEdge, int> left;
   for (std::size_t f = 0; f < faces.size(); ++f) {
     for (int k = 0; k < 3; ++k) {
-      left[{faces[f].corners[index(k)], faces[f].corners[index((k + 1) % 3)]}] = static_cast<int>(f);
+      left[{faces[f].corners[index(k)], faces[f].corners[index((k + 1) % 3)]}] =
+          static_cast<int>(f);
     }
   }
+
   std::vector<int> group(faces.size(), -1);
   std::vector<MergedFace> merged;
   for (std::size_t f = 0; f < faces.size(); ++f) {
@@ -123,6 +132,8 @@ std::vector<MergedFace> merged_faces(const std::vector<Face>& faces, double merg
     group[f] = g;
     Vec3 normal = Vec3::Zero();
     std::map<int, int> next;  // boundary corner -> the corner after it
+
+    // Flood over the triangles of one group; edges that are not crossed are its boundary.
     while (!stack.empty()) {
       const Face& face = faces[index(stack.back())];
       stack.pop_back();
@@ -141,6 +152,7 @@ std::vector<MergedFace> merged_faces(const std::vector<Face>& faces, double merg
         }
       }
     }
+
     Polygon corners{next.begin()->first};
     while (next.at(corners.back()) != corners.front()) corners.push_back(next.at(corners.back()));
     merged.push_back({std::move(corners), normal.normalized()});
@@ -157,11 +169,36 @@ std::vector<MergedFace> hull_faces(const std::vector<Vec3>& d, double merge_angl
   return {{std::move(front), normal}, {std::move(back), -normal}};
 }
 
+// Patches around one branch follow each other.
+void link_neighbours(JunctionTopology& t) {
+  for (const std::vector<int>& around : t.sectors) {
+    for (std::size_t k = 0; k < around.size(); ++k) {
+      const int next = around[(k + 1) % around.size()];
+      t.patches[index(around[k])].next = next;
+      t.patches[index(next)].previous = around[k];
+    }
+  }
+}
+
+// Each hull edge is seen from both of its ends: two patches, one saddle.
+void add_saddles(const std::map<DirectedEdge, int>& patch_of, JunctionTopology& t) {
+  for (const auto& [edge, patch] : patch_of) {
+    const auto [a, b] = edge;
+    if (a > b) continue;
+    const int other = patch_of.at({b, a});
+    t.patches[index(patch)].saddle = t.patches[index(other)].saddle =
+        static_cast<int>(t.saddles.size());
+    const JunctionPatch& p = t.patches[index(patch)];
+    t.saddles.push_back({a, b, p.from, p.to, patch, other});
+  }
+}
+
 }  // namespace
 
 JunctionTopology junction_topology(const std::vector<Vec3>& directions, double merge_angle_rad) {
   EXPECTS(directions.size() >= 3);
   JunctionTopology t;
+
   std::map<DirectedEdge, int> pole_left_of;  // the pole on the left of the hull edge a -> b
   std::map<DirectedEdge, int> turn;          // around corner b of a face: edge (b, c) for (a, b)
   for (const MergedFace& face : hull_faces(directions, merge_angle_rad)) {
@@ -175,6 +212,7 @@ JunctionTopology junction_topology(const std::vector<Vec3>& directions, double m
     }
     t.poles.push_back({face.normal, face.corners});
   }
+
   // Around branch a, after the edge a -> b comes the edge to the corner before a in the face left
   // of it.
   std::map<DirectedEdge, int> patch_of;
@@ -191,21 +229,9 @@ JunctionTopology junction_topology(const std::vector<Vec3>& directions, double m
       b = turn.at({a, b});
     } while (b != start->first.second);
   }
-  for (const std::vector<int>& around : t.sectors) {
-    for (std::size_t k = 0; k < around.size(); ++k) {
-      const int next = around[(k + 1) % around.size()];
-      t.patches[index(around[k])].next = next;
-      t.patches[index(next)].previous = around[k];
-    }
-  }
-  for (const auto& [edge, patch] : patch_of) {
-    const auto [a, b] = edge;
-    if (a > b) continue;
-    const int other = patch_of.at({b, a});
-    t.patches[index(patch)].saddle = t.patches[index(other)].saddle = static_cast<int>(t.saddles.size());
-    const JunctionPatch& p = t.patches[index(patch)];
-    t.saddles.push_back({a, b, p.from, p.to, patch, other});
-  }
+
+  link_neighbours(t);
+  add_saddles(patch_of, t);
   return t;
 }
 

@@ -8,13 +8,14 @@
 
 #include "base/index.h"
 #include "recovery/fit/closed_surface.h"
+#include "recovery/fit/rules.h"
 #include "recovery/imaging/mask/morphology.h"
 
 namespace angiospline {
 
 namespace {
 
-constexpr double kLongest = 3.0;  // radii: a blob's axis is no longer
+using namespace fit_rules;
 
 struct Piece {
   int voxels = 0;
@@ -28,7 +29,7 @@ bool is_blob(const Piece& piece, const CenterlineTree& tree) {
   if (piece.axis <= 1) return piece.branches.empty();
   if (piece.branches.size() != 1 || piece.at_border) return false;
   const CenterlineBranch& branch = tree.branches[index(piece.branches.front())];
-  return branch.from != branch.to && length_mm(branch) <= kLongest * branch.radii_mm.mean();
+  return branch.from != branch.to && length_mm(branch) <= kLongestBlob * branch.radii_mm.mean();
 }
 
 // The pieces of a labelled mask; a branch belongs to the piece at the middle of its line.
@@ -42,10 +43,12 @@ std::vector<Piece> pieces_of(const Components& components, const Mask& skeleton,
     Piece& piece = pieces[index(label - 1)];
     ++piece.voxels;
     piece.axis += skeleton.voxels[i] != 0 ? 1 : 0;
+
     const Voxel v = grid.voxel(i);
     for (std::size_t k = 0; k < 3; ++k)
       piece.at_border = piece.at_border || v[k] == 0 || v[k] == grid.size[k] - 1;
   }
+
   for (std::size_t b = 0; b < tree.branches.size(); ++b) {
     const Points3& line = tree.branches[b].points_mm;
     const Vec3 middle = grid.index_vox(line.col(line.cols() / 2));
@@ -66,6 +69,7 @@ CenterlineTree without(const CenterlineTree& tree, const std::vector<char>& drop
     if (dropped[b]) continue;
     renumbered[index(tree.branches[b].from)] = renumbered[index(tree.branches[b].to)] = 0;
   }
+
   CenterlineTree kept = tree;
   kept.nodes.clear();
   kept.branches.clear();
@@ -93,14 +97,17 @@ TreeAndPieces part_closed_pieces(const Mask& mask, const Mask& skeleton,
   EXPECTS(mask.grid.size == skeleton.grid.size);
   const Components components = connected_components(mask, Neighbours::kCorners26);
   const std::vector<Piece> pieces = pieces_of(components, skeleton, tree);
+
   std::vector<char> blob(pieces.size(), 0), dropped(tree.branches.size(), 0);
   for (std::size_t p = 0; p < pieces.size(); ++p) {
     if (!is_blob(pieces[p], tree)) continue;
     blob[p] = 1;
     for (const int b : pieces[p].branches) dropped[index(b)] = 1;
   }
+
   TreeAndPieces parted{tree, Mask(mask.grid)};
   if (std::find(dropped.begin(), dropped.end(), 0) == dropped.end()) return parted;
+
   parted.tree = without(tree, dropped);
   for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
     const int label = components.labels.voxels[i];
@@ -114,8 +121,11 @@ Result<void> add_closed_pieces(Model& model, const Mask& pieces, const Image<flo
   const bool none =
       std::none_of(pieces.voxels.begin(), pieces.voxels.end(), [](auto v) { return v != 0; });
   if (none) return {};
+
   auto closed = closed_model(pieces);
   if (!closed) return fail(closed.error());
+
+  // A piece that cannot be fitted is still better shown than left out.
   if (image != nullptr) {
     auto fitted = fit_model(*closed, *image, options, progress);
     if (!fitted && fitted.error().kind == ErrorKind::kCancelled) return fail(fitted.error());
@@ -127,6 +137,7 @@ Result<void> add_closed_pieces(Model& model, const Mask& pieces, const Image<flo
            "closed pieces were not fitted to the image: " + fitted.error().message()});
     }
   }
+
   append(model.network, closed->network);
   model.assumptions.push_back(
       fmt::format("{} of the mask without branches made closed surfaces",

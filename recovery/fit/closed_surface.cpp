@@ -13,14 +13,15 @@
 #include "base/index.h"
 #include "recovery/fit/patches.h"
 #include "recovery/fit/rings.h"
+#include "recovery/fit/rules.h"
 #include "recovery/imaging/mask/morphology.h"
 
 namespace angiospline {
 namespace {
 
+using namespace fit_rules;
+
 constexpr int kDegree = kPatchSize - 1;
-constexpr int kSamples = 12;       // along each side of a patch
-constexpr double kThinnest = 0.5;  // voxels: the least half axis
 
 // Points of the cube's surface on a lattice of 5 n steps along each edge.
 using Lattice = std::array<int, 3>;
@@ -65,8 +66,11 @@ void join_sides(const std::vector<std::array<Lattice, 4>>& corners, SurfaceNetwo
   std::map<std::pair<Lattice, Lattice>, End> waiting;
   for (std::size_t p = 0; p < corners.size(); ++p) {
     const auto& [c00, c10, c01, c11] = corners[p];
+
     const std::array<std::pair<Lattice, Lattice>, 4> sides{
         {{c00, c01}, {c10, c11}, {c00, c10}, {c01, c11}}};  // in the order of PatchSide
+
+    // The second patch that comes to a curve joins the first.
     for (std::size_t s = 0; s < 4; ++s) {
       const auto& [from, to] = sides[s];
       const Side side{static_cast<int>(p), static_cast<PatchSide>(s), 0.0, 1.0};
@@ -78,49 +82,75 @@ void join_sides(const std::vector<std::array<Lattice, 4>>& corners, SurfaceNetwo
   }
 }
 
+// Numbers for lattice points in the order in which they come, and the sphere's points there.
+struct SpherePoints {
+  std::map<Lattice, int> number;
+  std::vector<Vec3> points;
+};
+
+// One patch of a face: part (a, b) of its `divisions` along u and v.
+struct FacePart {
+  const CubeFace& face;
+  int a, b, divisions;
+  int steps() const { return kDegree * divisions; }
+};
+
+Patch patch_of(const FacePart& part, SpherePoints& sphere) {
+  Patch patch{KnotVector::bezier(kDegree), KnotVector::bezier(kDegree), {}, 0};
+  const int steps = part.steps();
+
+  for (int i = 0; i <= kDegree; ++i) {
+    for (int j = 0; j <= kDegree; ++j) {
+      const int k = kDegree * part.a + i, l = kDegree * part.b + j;
+      const auto [found, added] = sphere.number.try_emplace(lattice(part.face, k, l, steps),
+                                                            static_cast<int>(sphere.points.size()));
+      if (added) {
+        sphere.points.push_back(
+            direction(part.face, static_cast<double>(k) / steps, static_cast<double>(l) / steps));
+      }
+      patch.control.push_back(found->second);
+    }
+  }
+  return patch;
+}
+
+// Places of the sphere that the patch should run through.
+void add_samples(const FacePart& part, int patch, std::vector<PatchSample>& samples) {
+  for (int i = 0; i <= kSphereSteps; ++i) {
+    for (int j = 0; j <= kSphereSteps; ++j) {
+      PatchSample s;
+      s.patch = patch;
+      s.uv = Vec2(i, j) / kSphereSteps;
+      s.point_mm = s.normal = s.moved_normal = direction(
+          part.face, (part.a + s.uv.x()) / part.divisions, (part.b + s.uv.y()) / part.divisions);
+      s.weight = 1.0 / ((kSphereSteps + 1) * (kSphereSteps + 1));
+      samples.push_back(s);
+    }
+  }
+}
+
 // The unit sphere's patches and joins, control points at the lattice's directions; samples of the
 // sphere for them.
 SurfaceNetwork cube_of_patches(int divisions, std::vector<PatchSample>& samples) {
   SurfaceNetwork network;
-  const int steps = kDegree * divisions;
-  std::map<Lattice, int> number;
-  std::vector<Vec3> points;
+  SpherePoints sphere;
   std::vector<std::array<Lattice, 4>> corners;
   for (const CubeFace& face : kFaces) {
     for (int a = 0; a < divisions; ++a) {
       for (int b = 0; b < divisions; ++b) {
-        Patch patch{KnotVector::bezier(kDegree), KnotVector::bezier(kDegree), {}, 0};
-        for (int i = 0; i <= kDegree; ++i) {
-          for (int j = 0; j <= kDegree; ++j) {
-            const int k = kDegree * a + i, l = kDegree * b + j;
-            const auto [found, added] =
-                number.try_emplace(lattice(face, k, l, steps), static_cast<int>(points.size()));
-            if (added) {
-              points.push_back(
-                  direction(face, static_cast<double>(k) / steps, static_cast<double>(l) / steps));
-            }
-            patch.control.push_back(found->second);
-          }
-        }
+        const FacePart part{face, a, b, divisions};
+
         const auto corner = [&](int i, int j) {
-          return lattice(face, kDegree * (a + i), kDegree * (b + j), steps);
+          return lattice(face, kDegree * (a + i), kDegree * (b + j), part.steps());
         };
         corners.push_back({corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)});
-        for (int i = 0; i <= kSamples; ++i) {
-          for (int j = 0; j <= kSamples; ++j) {
-            PatchSample s;
-            s.patch = static_cast<int>(network.patches.size());
-            s.uv = Vec2(i, j) / kSamples;
-            s.point_mm = s.normal = s.moved_normal =
-                direction(face, (a + s.uv.x()) / divisions, (b + s.uv.y()) / divisions);
-            s.weight = 1.0 / ((kSamples + 1) * (kSamples + 1));
-            samples.push_back(s);
-          }
-        }
-        network.patches.push_back(std::move(patch));
+        add_samples(part, static_cast<int>(network.patches.size()), samples);
+        network.patches.push_back(patch_of(part, sphere));
       }
     }
   }
+
+  const std::vector<Vec3>& points = sphere.points;
   network.control_points_mm =
       Eigen::Map<const Points3>(points.data()->data(), 3, static_cast<Eigen::Index>(points.size()));
   join_sides(corners, network);
@@ -132,13 +162,17 @@ SurfaceNetwork unit_sphere(int divisions) {
   SurfaceNetwork network = cube_of_patches(divisions, samples);
   std::vector<int> patches(network.patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) patches[p] = static_cast<int>(p);
+
   PatchGroup group = patch_group(network, patches);
   std::fill(group.net.scale.begin(), group.net.scale.end(), 1.0);
   number_unknowns(group);
   for (const Join& join : network.joins) add_edge(group, join, 1);
+
+  // Samples lie on the sphere: the group is moved onto it and made smooth.
   const MovedGroup moved = move_group(group, samples, Points3::Zero(3, group.net.points.cols()),
-                                      PatchWeights{}, {0.0}, 0.0);
+                                      PatchWeights{}, std::array{0.0}, 0.0);
   EXPECTS(moved.failure.empty());
+
   for (std::size_t k = 0; k < group.columns.size(); ++k) {
     network.control_points_mm.col(group.columns[k]) =
         group.net.points.col(static_cast<Eigen::Index>(k));
@@ -168,6 +202,8 @@ std::vector<std::vector<int>> closed_patches(const SurfaceNetwork& network) {
     const KnotVector bezier = KnotVector::bezier(kDegree);
     if (!(patch.u == bezier && patch.v == bezier)) other[index(patch.region)] = 1;
   }
+
+  // What meets another region, or a part of a side, or an open end is no closed surface.
   for (const Join& join : network.joins) {
     const int a = network.patches[index(join.a.patch)].region;
     const int b = network.patches[index(join.b.patch)].region;
@@ -177,6 +213,7 @@ std::vector<std::vector<int>> closed_patches(const SurfaceNetwork& network) {
   for (const Rim& rim : network.rims) {
     for (const Side& side : rim.sides) other[index(network.patches[index(side.patch)].region)] = 1;
   }
+
   for (std::size_t r = 0; r < closed.size(); ++r) {
     if (other[r]) closed[r].clear();
   }
@@ -185,180 +222,61 @@ std::vector<std::vector<int>> closed_patches(const SurfaceNetwork& network) {
 
 namespace {
 
-constexpr int kHalves = 2 * kDegree;  // the last of the control points of a side in two halves
-
-// Rows: control points of the two halves of a Bezier curve, the middle one once.
-Eigen::Matrix<double, kHalves + 1, kPatchSize> halving_matrix() {
-  Eigen::Matrix<double, kHalves + 1, kPatchSize> H;
-  const Eigen::Matrix<double, kPatchSize, kPatchSize> all =
-      Eigen::Matrix<double, kPatchSize, kPatchSize>::Identity();
-  Eigen::Matrix<double, kPatchSize, kPatchSize> level = all;  // de Casteljau at 1/2
-  for (int k = 0; k <= kDegree; ++k) {
-    H.row(k) = level.row(0);
-    H.row(kHalves - k) = level.row(kDegree - k);
-    for (int i = 0; i < kDegree - k; ++i) {
-      level.row(i) = ((level.row(i) + level.row(i + 1)) / 2).eval();
-    }
-  }
-  return H;
-}
-
-// Pool columns of the points on the patches' sides: one for each place of a shared curve.
-class SideColumns {
- public:
-  explicit SideColumns(std::vector<Vec3>& pool) : pool_(pool) {}
-
-  // `curve` has the six old columns of the side, `k` is the place along it.
-  int at_place(std::array<int, kPatchSize> curve, int k, const Vec3& point) {
-    if (k == 0) return curve.front();
-    if (k == kHalves) return curve.back();
-    std::array<int, kPatchSize> other = curve;
-    std::reverse(other.begin(), other.end());
-    if (other < curve) {
-      curve = other;
-      k = kHalves - k;
-    }
-    const auto [found, added] = known_.try_emplace({curve, k}, static_cast<int>(pool_.size()));
-    if (added) pool_.push_back(point);
-    return found->second;
-  }
-
- private:
-  std::vector<Vec3>& pool_;
-  std::map<std::pair<std::array<int, kPatchSize>, int>, int> known_;
+// Sums over the voxels of a connected piece; places are relative to the grid's origin.
+struct PieceSums {
+  double count = 0;
+  Vec3 sum = Vec3::Zero();
+  Mat3 squares = Mat3::Zero();
 };
 
-// Columns of the finer net of a patch, row by row along u.
-std::vector<int> halved_columns(const SurfaceNetwork& network, const Patch& patch,
-                                std::vector<Vec3>& pool, SideColumns& sides) {
-  static const auto H = halving_matrix();
-  Eigen::Matrix<double, kPatchSize, 3 * kPatchSize> net;  // row i along u, triples along v
-  for (int i = 0; i < kPatchSize; ++i) {
-    for (int j = 0; j < kPatchSize; ++j) {
-      net.block<1, 3>(i, 3 * j) =
-          network.control_points_mm.col(patch.control[index(i * kPatchSize + j)]).transpose();
-    }
-  }
-  const auto old = [&](int i, int j) { return patch.control[index(i * kPatchSize + j)]; };
-  std::vector<int> columns;
-  for (int i = 0; i <= kHalves; ++i) {
-    const Eigen::RowVectorXd along = H.row(i) * net;
-    for (int j = 0; j <= kHalves; ++j) {
-      Vec3 point = Vec3::Zero();
-      for (int b = 0; b < kPatchSize; ++b) point += H(j, b) * along.segment<3>(3 * b).transpose();
-      std::array<int, kPatchSize> curve;
-      if (i == 0 || i == kHalves) {
-        for (int b = 0; b < kPatchSize; ++b) curve[index(b)] = old(i == 0 ? 0 : kDegree, b);
-        columns.push_back(sides.at_place(curve, j, point));
-      } else if (j == 0 || j == kHalves) {
-        for (int b = 0; b < kPatchSize; ++b) curve[index(b)] = old(b, j == 0 ? 0 : kDegree);
-        columns.push_back(sides.at_place(curve, i, point));
-      } else {
-        columns.push_back(static_cast<int>(pool.size()));
-        pool.push_back(point);
-      }
-    }
-  }
-  return columns;
-}
-
-}  // namespace
-
-SurfaceNetwork with_quartered(const SurfaceNetwork& network, const std::vector<int>& patches) {
-  SurfaceNetwork finer = network;
-  std::vector<Vec3> pool;
-  for (Eigen::Index c = 0; c < network.control_points_mm.cols(); ++c) {
-    pool.push_back(network.control_points_mm.col(c));
-  }
-  SideColumns sides(pool);
-  // quarter[p][2 a + b]: the part of patch p in half a along u and half b along v.
-  std::map<int, std::array<int, 4>> quarter;
-  for (const int p : patches) {
-    const Patch& old = network.patches[index(p)];
-    const std::vector<int> columns = halved_columns(network, old, pool, sides);
-    for (int q = 0; q < 4; ++q) {
-      Patch part{old.u, old.v, {}, old.region};
-      for (int i = 0; i <= kDegree; ++i) {
-        for (int j = 0; j <= kDegree; ++j) {
-          const int row = kDegree * (q / 2) + i, column = kDegree * (q % 2) + j;
-          part.control.push_back(columns[index(row * (kHalves + 1) + column)]);
-        }
-      }
-      quarter[p][index(q)] = q == 0 ? p : static_cast<int>(finer.patches.size());
-      if (q == 0) {
-        finer.patches[index(p)] = std::move(part);
-      } else {
-        finer.patches.push_back(std::move(part));
-      }
-    }
-  }
-  const auto part_of = [&](const Side& side, int half) {
-    const std::array<int, 4>& q = quarter.at(side.patch);
-    const bool along_v = side.side == PatchSide::kU0 || side.side == PatchSide::kU1;
-    const int far = side.side == PatchSide::kU1 || side.side == PatchSide::kV1 ? 1 : 0;
-    return Side{q[index(along_v ? 2 * far + half : 2 * half + far)], side.side, 0.0, 1.0};
-  };
-  finer.joins.clear();
-  for (const Join& join : network.joins) {
-    if (!quarter.contains(join.a.patch)) {
-      finer.joins.push_back(join);
-      continue;
-    }
-    for (int half = 0; half < 2; ++half) {
-      finer.joins.push_back(
-          {part_of(join.a, half), part_of(join.b, join.reversed ? 1 - half : half), join.reversed});
-    }
-  }
-  for (const auto& [p, q] : quarter) {
-    for (int k = 0; k < 2; ++k) {
-      finer.joins.push_back(
-          {{q[index(k)], PatchSide::kU1}, {q[index(2 + k)], PatchSide::kU0}, false});
-      finer.joins.push_back(
-          {{q[index(2 * k)], PatchSide::kV1}, {q[index(2 * k + 1)], PatchSide::kV0}, false});
-    }
-  }
-  finer.control_points_mm =
-      Eigen::Map<const Points3>(pool.data()->data(), 3, static_cast<Eigen::Index>(pool.size()));
-  return compacted(std::move(finer));
-}
-
-Result<Model> closed_model(const Mask& mask) {
-  struct Piece {
-    double count = 0;
-    Vec3 sum = Vec3::Zero();
-    Mat3 squares = Mat3::Zero();
-  };
+// The largest first.
+std::vector<PieceSums> sums_of_pieces(const Mask& mask) {
   const Components components = connected_components(mask, Neighbours::kCorners26);
-  std::vector<Piece> pieces(components.list.size());
+  std::vector<PieceSums> pieces(components.list.size());
   for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
     const int label = components.labels.voxels[i];
     if (label == 0) continue;
     const Voxel v = mask.grid.voxel(i);
     const Vec3 p = mask.grid.world_mm(Vec3(v[0], v[1], v[2])) - mask.grid.origin_mm;
-    Piece& piece = pieces[index(label - 1)];
+    PieceSums& piece = pieces[index(label - 1)];
     piece.count += 1;
     piece.sum += p;
     piece.squares += p * p.transpose();
   }
+
   std::stable_sort(pieces.begin(), pieces.end(),
-                   [](const Piece& a, const Piece& b) { return a.count > b.count; });
+                   [](const PieceSums& a, const PieceSums& b) { return a.count > b.count; });
+  return pieces;
+}
+
+// The ellipsoid of the piece's second moments: those of a solid one are a fifth of its squared half
+// axes.
+SurfaceNetwork ellipsoid_of(const PieceSums& piece, const ImageGrid& grid,
+                            const std::string& name) {
+  const Vec3 center = piece.sum / piece.count;
+  const Mat3 spread = piece.squares / piece.count - center * center.transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
+  const double least = kThinnestVox * std::cbrt(grid.spacing_mm.prod());
+  const Vec3 half = (5 * axes.eigenvalues()).cwiseMax(least * least).cwiseSqrt();
+  return closed_surface(grid.origin_mm + center, axes.eigenvectors() * half.asDiagonal(), name);
+}
+
+}  // namespace
+
+Result<Model> closed_model(const Mask& mask) {
+  const std::vector<PieceSums> pieces = sums_of_pieces(mask);
   Model model;
   model.name = "closed";
   int small = 0;
-  for (const Piece& piece : pieces) {
+  for (const PieceSums& piece : pieces) {
     if (piece.count < kFewestClosedVoxels) {
       ++small;
       continue;
     }
-    const Vec3 center = piece.sum / piece.count;
-    const Mat3 spread = piece.squares / piece.count - center * center.transpose();
-    const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
-    const double least = kThinnest * std::cbrt(mask.grid.spacing_mm.prod());
-    const Vec3 half = (5 * axes.eigenvalues()).cwiseMax(least * least).cwiseSqrt();
-    append(model.network,
-           closed_surface(mask.grid.origin_mm + center, axes.eigenvectors() * half.asDiagonal(),
-                          fmt::format("closed_{}", model.network.regions.size() + 1)));
+    append(model.network, ellipsoid_of(piece, mask.grid,
+                                       fmt::format("closed_{}", model.network.regions.size() + 1)));
   }
+
   if (model.network.patches.empty()) {
     return fail({ErrorKind::kBadInput,
                  "the mask has no piece large enough for a surface",

@@ -19,10 +19,13 @@ std::vector<PartFigures> part_figures(const TriangleMesh& mesh, const MeshField&
     moved[k] = std::sqrt(
         tree.nearest(mesh.points_mm.col(static_cast<Eigen::Index>(k))).squared_distance_mm2);
   });
+
   std::vector<PartFigures> figures(mesh.parts.size() + 1);
   std::vector<double> area(figures.size(), 0.0), known(figures.size(), 0.0);
   for (std::size_t p = 0; p < mesh.parts.size(); ++p) figures[p].name = mesh.parts[p].name;
   figures.back().name = "all";
+
+  // Means over area: each corner stands for a third of its triangle.
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     const std::size_t part = at(mesh.part_of[at(t)]);
     if (!is_wall(mesh.parts[part].kind)) continue;
@@ -30,6 +33,7 @@ std::vector<PartFigures> part_figures(const TriangleMesh& mesh, const MeshField&
     const Vec3 a = mesh.points_mm.col(c(0));
     const double weight =
         (mesh.points_mm.col(c(1)) - a).cross(mesh.points_mm.col(c(2)) - a).norm() / 6;
+
     for (const std::size_t p : {part, figures.size() - 1}) {
       for (const int k : c) {
         figures[p].moved_mean_mm += weight * moved[at(k)];
@@ -43,6 +47,7 @@ std::vector<PartFigures> part_figures(const TriangleMesh& mesh, const MeshField&
       }
     }
   }
+
   std::vector<PartFigures> kept;
   for (std::size_t p = 0; p < figures.size(); ++p) {
     if (area[p] > 0) figures[p].moved_mean_mm /= area[p];

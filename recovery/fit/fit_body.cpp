@@ -10,15 +10,12 @@
 #include "kernel/evaluate/curvature.h"
 #include "kernel/numerics/banded.h"
 #include "kernel/spline/basis.h"
+#include "recovery/fit/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kRidge = 1e-7;  // of the mean diagonal: spans without nodes stay as they are
-// Of the mean diagonal, on second differences of a body's rows: the first that does not fold.
-constexpr std::array<double, 4> kFairness{3e-4, 3e-3, 0.03, 0.3};
-constexpr double kLeastShare = 0.125;   // of a body's way
-constexpr double kLeastJacobian = 0.3;  // of a body, relative to what it was
+using namespace fit_rules;
 
 class BodyFitter {
  public:
@@ -36,13 +33,16 @@ class BodyFitter {
       }
       return moves;
     };
+
     const Points3 start = end_move(0), end = end_move(rows - 1);
     if (start.isZero(0) && end.isZero(0) && !any_moves()) return {};
+
     const int first = free_start ? 1 : 2;
     const int last = free_end ? rows - 2 : rows - 3;
     Points3 moves = Points3::Zero(3, static_cast<Eigen::Index>(rows) * n);
     for (int i = 0; i < first; ++i) moves.middleCols(i * n, n) = start;
     for (int i = last + 1; i < rows; ++i) moves.middleCols(i * n, n) = end;
+
     BodyFit fit;
     const Points3 given = moves;
     const auto attempt = [&](double share, double fairness) {
@@ -52,12 +52,15 @@ class BodyFitter {
       fit.share = share;
       return !folded(fit.points);
     };
-    for (const double fairness : kFairness) {
+
+    // As it is asked for, then stiffer, then a part of the way.
+    for (const double fairness : kBody.fairness) {
       if (attempt(1.0, fairness)) return fit;
     }
-    for (double share = 0.5; share >= kLeastShare; share /= 2) {
-      if (attempt(share, kFairness.back())) return fit;
+    for (double share = 0.5; share >= kBody.least_share; share /= 2) {
+      if (attempt(share, kBody.fairness.back())) return fit;
     }
+
     // Only the ends move; their moves die out over the rows between.
     for (int i = first; i <= last; ++i) {
       const double w = static_cast<double>(i) / (rows - 1);
@@ -88,54 +91,75 @@ class BodyFitter {
     return net;
   }
 
+  // The normal equations of the rows that are free: band matrix and right-hand sides.
+  struct Equations {
+    int first, last;  // the free rows
+    SymmetricBand A;
+    Eigen::MatrixXd b;
+  };
+
   // Least squares over rows first .. last, all other rows of `moves` given. Banded: rows of the net
   // are six apart at most.
   void solve_rows(int first, int last, double share, double fairness, Points3& moves) const {
     const Eigen::MatrixXd basis = ring_.basis();
     const Eigen::Index d = basis.cols();
     const Eigen::Index size = d * (last - first + 1);
-    SymmetricBand A = SymmetricBand::Zero(std::min(size, 6 * d), size);
-    Eigen::MatrixXd b = Eigen::MatrixXd::Zero(size, 3);
+    Equations equations{first, last, SymmetricBand::Zero(std::min(size, 6 * d), size),
+                        Eigen::MatrixXd::Zero(size, 3)};
     for (std::size_t k = 0; k < ring_.patches.size(); ++k) {
       for (const int node : wall_.nodes_of[index(ring_.patches[k])]) {
-        const Vec2& uv = wall_.mesh.origins[index(node)].uv;
-        const BasisValues bu = basis_at(ring_.u, uv.x(), 0);
-        const auto [c0, bv] =
-            ring_functions(static_cast<double>(k) + uv.y(), static_cast<int>(ring_.patches.size()));
-        const Eigen::VectorXd around = ring_row(ring_, basis, static_cast<double>(k) + uv.y());
-        Vec3 value = share * wall_.move_of(node);
-        Eigen::VectorXd row = Eigen::VectorXd::Zero(6 * d);
-        Eigen::Index from = -1;
-        int parts = 0;
-        for (int i = 0; i < 6; ++i) {
-          const int r = bu.first + i;
-          const double w = bu.values(0, i);
-          if (r >= first && r <= last) {
-            if (from < 0) from = d * (r - first);
-            row.segment(d * parts++, d) = w * around;
-          } else {
-            for (int j = 0; j < 6; ++j) {
-              value -= w * bv(j) * moves.col(r * ring_.points() + (c0 + j) % ring_.points());
-            }
-          }
-        }
-        if (from < 0) continue;
-        const Eigen::Index count = d * parts;
-        for (Eigen::Index x = 0; x < count; ++x) {
-          const double wx = wall_.mass_mm2(node) * row(x);
-          if (wx == 0) continue;
-          for (Eigen::Index y = x; y < count; ++y) A(y - x, from + x) += wx * row(y);
-          b.row(from + x) += wx * value.transpose();
-        }
+        add_node(node, k, basis, share, moves, equations);
       }
     }
+
+    SymmetricBand& A = equations.A;
+    Eigen::MatrixXd& b = equations.b;
     add_fairness(first, last, basis, fairness, moves, A, b);
-    A.row(0).array() += kRidge * A.row(0).mean() + 1e-300;
+    A.row(0).array() += kBody.ridge * A.row(0).mean() + 1e-300;
     if (!factorise_band(A)) return;
     solve_band(A, b);
     for (int i = first; i <= last; ++i) {
       moves.middleCols(i * ring_.points(), ring_.points()) =
           (basis * b.middleRows(d * (i - first), d)).transpose();
+    }
+  }
+
+  // One node of patch k of the ring: its move is what the net should do there, weighted by the
+  // node's area.
+  void add_node(int node, std::size_t k, const Eigen::MatrixXd& basis, double share,
+                const Points3& moves, Equations& equations) const {
+    const Eigen::Index d = basis.cols();
+    const Vec2& uv = wall_.mesh.origins[index(node)].uv;
+    const double place = static_cast<double>(k) + uv.y();
+    const BasisValues bu = basis_at(ring_.u, uv.x(), 0);
+    const auto [c0, bv] = ring_functions(place, static_cast<int>(ring_.patches.size()));
+    const Eigen::VectorXd around = ring_row(ring_, basis, place);
+
+    // What given rows do to the node goes to its right-hand side.
+    Vec3 value = share * wall_.move_of(node);
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(6 * d);
+    Eigen::Index from = -1;
+    int parts = 0;
+    for (int i = 0; i < 6; ++i) {
+      const int r = bu.first + i;
+      const double w = bu.values(0, i);
+      if (r >= equations.first && r <= equations.last) {
+        if (from < 0) from = d * (r - equations.first);
+        row.segment(d * parts++, d) = w * around;
+      } else {
+        for (int j = 0; j < 6; ++j) {
+          value -= w * bv(j) * moves.col(r * ring_.points() + (c0 + j) % ring_.points());
+        }
+      }
+    }
+    if (from < 0) return;
+
+    const Eigen::Index count = d * parts;
+    for (Eigen::Index x = 0; x < count; ++x) {
+      const double wx = wall_.mass_mm2(node) * row(x);
+      if (wx == 0) continue;
+      for (Eigen::Index y = x; y < count; ++y) equations.A(y - x, from + x) += wx * row(y);
+      equations.b.row(from + x) += wx * value.transpose();
     }
   }
 
@@ -146,10 +170,13 @@ class BodyFitter {
     const Eigen::Index d = basis.cols();
     const double weight = fairness * A.row(0).mean();
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> to_numbers(basis);
+
     const auto given = [&](int row) -> Eigen::MatrixXd {
       return to_numbers.solve(
           moves.middleCols(row * ring_.points(), ring_.points()).transpose().eval());
     };
+
+    // Squares of x(i - 1) - 2 x(i) + x(i + 1); rows that are given go to the right-hand side.
     constexpr std::array<double, 3> kDifference{1, -2, 1};
     for (int middle = std::max(1, first - 1); middle <= std::min(ring_.rows() - 2, last + 1);
          ++middle) {
@@ -183,6 +210,7 @@ class BodyFitter {
           control.col(i * 6 + j) = net.col(i * n + (kPerPatch * static_cast<int>(k) + j) % n);
         }
       }
+
       const BSplineSurface<3> old = patch_surface(old_, ring_.patches[k]);
       const BSplineSurface<3> moved(ring_.u, old.v(), control);
       const std::vector<double> breaks = ring_.u.breakpoints();
@@ -198,13 +226,14 @@ class BodyFitter {
         }
       }
     }
+
     if (!(sum_after > 0)) return true;
     const double count = static_cast<double>(areas.size());
     for (const auto& [one, other] : areas) {
       before = std::min(before, one * count / sum_before);
       after = std::min(after, other * count / sum_after);
     }
-    return after < kLeastJacobian * before;
+    return after < kBody.least_jacobian * before;
   }
 
   const SurfaceNetwork& old_;

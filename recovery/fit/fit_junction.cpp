@@ -3,20 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <span>
 
 #include <Eigen/Geometry>
 
 #include "base/index.h"
+#include "recovery/fit/rules.h"
 
 namespace angiospline {
 namespace {
 
-// Second differences of a junction's move: the first that passes every gate.
-const std::vector<double> kRoughness{0.0003, 0.002, 0.03, 0.5};
-const std::vector<double> kClosedRoughness{0.0, 0.002, 0.03};
-constexpr double kAnchor = 0.02;  // shape comes before the places of parameters
-constexpr int kClosedRatioDegree = 1;
-constexpr double kLeastJacobian = 0.03;
+using namespace fit_rules;
 
 // Slots of all points; the axis of each ring, or nothing if its second row does not follow one.
 std::optional<std::vector<Vec3>> free_points(const SurfaceNetwork& network,
@@ -32,7 +29,10 @@ std::optional<std::vector<Vec3>> free_points(const SurfaceNetwork& network,
       axis += rim - network.control_points_mm.col(ring.columns(1, c));
       center += rim / ring.points();
     }
+
     axis.normalize();
+
+    // Every point of the second row has to lie behind its own of the rim.
     double radius = 0;
     for (int c = 0; c < ring.points(); ++c) {
       const Vec3 rim = network.control_points_mm.col(ring.columns(0, c));
@@ -40,6 +40,7 @@ std::optional<std::vector<Vec3>> free_points(const SurfaceNetwork& network,
       if (step.cross(axis).norm() > 1e-7 * step.norm() || step.dot(axis) <= 0) return {};
       radius += (rim - center).norm() / ring.points();
     }
+
     for (std::size_t k = 0; k < ring.patches.size(); ++k) {
       const std::array<int, kPatchPoints>& control = group.controls[first + k];
       for (int i = 0; i < kPatchSize; ++i) {
@@ -53,6 +54,7 @@ std::optional<std::vector<Vec3>> free_points(const SurfaceNetwork& network,
     }
     first += ring.patches.size();
   }
+
   number_unknowns(group);
   return axes;
 }
@@ -63,9 +65,11 @@ bool make_edges(const SurfaceNetwork& network, const std::vector<Vec3>& axes, Pa
   for (const Join& join : network.joins) {
     const int a = group.index_of(join.a.patch);
     if (a < 0 || group.index_of(join.b.patch) < 0) continue;
+
     const bool leg = (join.a.side == PatchSide::kV0 && join.b.side == PatchSide::kV1) ||
                      (join.a.side == PatchSide::kV1 && join.b.side == PatchSide::kV0);
     const bool saddle = join.a.side == PatchSide::kU1 && join.b.side == PatchSide::kU1;
+
     if (!leg && !saddle) return false;
     if (leg) {
       add_leg(group, join, degrees.leg, axes[index(a)]);
@@ -80,8 +84,8 @@ MovedPatches refused(std::string why) { return {{}, 0.0, std::move(why), 0.0, 0.
 
 MovedPatches move_from(PatchGroup& group, const std::vector<PatchSample>& samples,
                        const Points3& start, const PatchWeights& weights,
-                       const std::vector<double>& roughness) {
-  const double wanted = std::max(kLeastJacobian, 0.5 * jacobian_ratio(group));
+                       std::span<const double> roughness) {
+  const double wanted = std::max(kLeastJacobianRatio, 0.5 * jacobian_ratio(group));
   const MovedGroup moved = move_group(group, samples, start, weights, roughness, wanted);
   MovedPatches result{{}, moved.share, moved.failure, moved.worst_angle_deg, moved.jacobian_ratio};
   for (std::size_t k = 0; k < group.columns.size(); ++k) {

@@ -13,14 +13,13 @@
 #include "recovery/fit/reduction.h"
 #include "recovery/fit/refit.h"
 #include "recovery/fit/rings.h"
+#include "recovery/fit/rules.h"
+#include "recovery/wall/evidence_of_greys.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kEvidence = 0.25;  // of the contrast across a region's wall: less is no wall
-constexpr std::array<double, 2> kCaptureWindows{0.4, 0.2};  // of a closed surface, in its radii
-constexpr int kClosedRounds = 2;
-constexpr double kLeastCovered = 0.5;  // of the nodes: fewer in the image, and the frames differ
+using namespace fit_rules;
 
 // Displacements of a region without edge are zero, and so is the pull on its neighbours.
 void hold_regions(const FitMesh& mesh, const std::vector<char>& hold, Displacement& displacement) {
@@ -63,14 +62,17 @@ class Fitter {
     if (const auto apart = check_frames(model.network.control_points_mm)) return fail(*apart);
     FittedModel fitted{model, {}};
     if (!options_.capture) return refined(std::move(fitted), options_.rounds);
+
     double radius = 0;
     const std::vector<std::vector<int>> closed = closed_patches(model.network);
     for (std::size_t r = 0; r < closed.size(); ++r) {
       if (!closed[r].empty()) radius = std::max(radius, model.network.regions[r].radius_mm);
     }
+
     // A closed surface has no centerline to be led by: it is captured by its own wall, in windows
     // that become narrower.
     if (radius == 0) return refined(std::move(fitted), options_.rounds);
+
     const double least = options_.displacement.half_windows_vox.front();
     for (const double share : kCaptureWindows) {
       DisplacementOptions wide = options_.displacement;
@@ -103,14 +105,17 @@ class Fitter {
   Result<FittedModel> refined(FittedModel fitted, int rounds) {
     SurfaceNetwork& network = fitted.model.network;
     network = with_finer_bodies(network, options_.body_spans);
+
     for (int round = 0; round < rounds; ++round) {
       if (auto moved = refine(network, fitted.report, options_.displacement); !moved) {
         return fail(moved.error());
       }
     }
+
     if (auto fine = refit_where_large(field_, options_, network, fitted.report, progress_); !fine) {
       return fail(fine.error());
     }
+
     for (const std::string& name : fitted.report.without_edge) {
       fitted.model.warnings.push_back(
           {WarningCode::kNoWallInImage,
@@ -121,6 +126,7 @@ class Fitter {
           {WarningCode::kRegionNotRefined,
            fmt::format("{} was not refined to the image: {}", held.name, held.why)});
     }
+
     fitted.report.control_points_before_reduction =
         static_cast<int>(network.control_points_mm.cols());
     reduce(network, fitted.report);
@@ -133,6 +139,7 @@ class Fitter {
     if (report.reduction_mm > 0) network = with_fewer_knots(network, report.reduction_mm);
   }
 
+  // Moves the network to its evidence once.
   Result<void> refine(SurfaceNetwork& network, FitReport& report,
                       const DisplacementOptions& options) {
     FitMeshOptions spacing;
@@ -140,36 +147,22 @@ class Fitter {
     auto mesh = make_fit_mesh(network, spacing, progress_);
     if (!mesh) return fail(mesh.error());
     MeshSmoother smoother(*mesh);
-    Displacement displacement = wall_displacement(field_, *mesh, smoother, options, progress_);
+
+    EvidenceOfGreys evidence(field_);
+    Displacement displacement = wall_displacement(evidence, *mesh, smoother, options, progress_);
     if (progress_.should_stop()) return fail(cancelled("wall"));
-    report.contrast = displacement.greys.contrast;
-    report.noise = displacement.greys.noise;
-    report.noise_kind = displacement.greys.kind;
-    report.snr = displacement.greys.snr();
+    report.contrast = evidence.greys().contrast;
+    report.noise = evidence.greys().noise;
+    report.noise_kind = evidence.greys().kind;
+    report.snr = evidence.greys().snr();
     report.nodes = mesh->size();
     report.iterations += static_cast<int>(options.half_windows_vox.size());
     report.degrees_of_freedom = displacement.degrees_of_freedom;
     report.wave_factor = displacement.wave_factor;
-    if (!(report.contrast > 0)) {
-      return fail({ErrorKind::kBadInput,
-                   fmt::format("the vessel is not {} than its background",
-                               options_.dark ? "darker" : "brighter"),
-                   "fit", fmt::format("{:.4g}", report.contrast),
-                   options_.dark ? "grey outside minus grey inside the model's wall must be "
-                                   "positive; bright vessels need no --dark"
-                                 : "grey inside minus grey outside the model's wall must be "
-                                   "positive; dark vessels need --dark"});
-    }
-    std::vector<char> hold(network.regions.size(), 0);
-    for (std::size_t r = 0; r < displacement.evidence.size(); ++r) {
-      hold[r] = displacement.evidence[r] < kEvidence;
-      const std::string& name = network.regions[r].name;
-      auto& without = report.without_edge;
-      const bool listed = std::find(without.begin(), without.end(), name) != without.end();
-      hold[r] = hold[r] || listed;
-      if (hold[r] && !listed) without.push_back(name);
-    }
-    hold_regions(*mesh, hold, displacement);
+    if (!(report.contrast > 0)) return fail(no_contrast(report.contrast));
+
+    // Walls that the image does not show stay, and the others are moved around them.
+    hold_regions(*mesh, without_edge(network, displacement, report), displacement);
     auto moved = move_network(network, *mesh, displacement.normal_mm, progress_);
     if (!moved) return fail(moved.error());
     network = std::move(moved->network);
@@ -177,6 +170,31 @@ class Fitter {
     const Eigen::VectorXd& mass = smoother.mass_mm2();
     report.mean_move_mm = mass.dot(displacement.normal_mm.cwiseAbs()) / mass.sum();
     return {};
+  }
+
+  Error no_contrast(double contrast) const {
+    return {ErrorKind::kBadInput,
+            fmt::format("the vessel is not {} than its background",
+                        options_.dark ? "darker" : "brighter"),
+            "fit", fmt::format("{:.4g}", contrast),
+            options_.dark ? "grey outside minus grey inside the model's wall must be "
+                            "positive; bright vessels need no --dark"
+                          : "grey inside minus grey outside the model's wall must be "
+                            "positive; dark vessels need --dark"};
+  }
+
+  // Which regions have no edge in the image, now or before; the report names them.
+  static std::vector<char> without_edge(const SurfaceNetwork& network,
+                                        const Displacement& displacement, FitReport& report) {
+    std::vector<char> hold(network.regions.size(), 0);
+    std::vector<std::string>& names = report.without_edge;
+    for (std::size_t r = 0; r < displacement.evidence.size(); ++r) {
+      const std::string& name = network.regions[r].name;
+      const bool listed = std::find(names.begin(), names.end(), name) != names.end();
+      hold[r] = listed || displacement.evidence[r] < kEvidence;
+      if (hold[r] && !listed) names.push_back(name);
+    }
+    return hold;
   }
 
   Image<float> brightened_;  // dark vessels made bright
@@ -197,8 +215,10 @@ std::optional<Error> frames_apart(const Points3& points_mm, const ImageGrid& gri
     }
     covered += inside ? 1 : 0;
   }
+
   const double share = static_cast<double>(covered) / static_cast<double>(points_mm.cols());
   if (share >= kLeastCovered) return {};
+
   const Vec3 center = points_mm.rowwise().mean();
   const Vec3 middle = grid.world_mm(
       Vec3((grid.size[0] - 1) / 2.0, (grid.size[1] - 1) / 2.0, (grid.size[2] - 1) / 2.0));
@@ -219,8 +239,8 @@ Result<Image<float>> grey_image(const AnyImage& image, const std::string& file) 
                    "at least 4 voxels along each axis"});
     }
   }
+
   Image<float> grey(grid);
-  float least = std::numeric_limits<float>::infinity(), most = -least;
   std::visit(
       [&](const auto& typed) {
         for (std::size_t i = 0; i < grey.voxels.size(); ++i) {
@@ -228,6 +248,8 @@ Result<Image<float>> grey_image(const AnyImage& image, const std::string& file) 
         }
       },
       image);
+
+  float least = std::numeric_limits<float>::infinity(), most = -least;
   for (std::size_t i = 0; i < grey.voxels.size(); ++i) {
     const float value = grey.voxels[i];
     if (!std::isfinite(value)) {
@@ -239,6 +261,7 @@ Result<Image<float>> grey_image(const AnyImage& image, const std::string& file) 
     least = std::min(least, value);
     most = std::max(most, value);
   }
+
   if (!(most > least)) {
     return fail({ErrorKind::kBadInput, "the image is constant", file, fmt::format("{}", least),
                  "vessels differ from their background"});
@@ -277,12 +300,16 @@ MeshField wall_residual(const Model& model, const Tessellation& tessellation,
   const GreyField field(options.dark ? brightened : image);
   FitMeshOptions spacing;
   spacing.voxel_mm = field.voxel_mm();
+
   const FitMesh mesh = fit_mesh_of(model.network, tessellation, spacing);
   MeshSmoother smoother(mesh);
+
   DisplacementOptions one_round = options.displacement;
   one_round.half_windows_vox = {options.displacement.half_windows_vox.back()};
   one_round.wave_factors = {1.0};
-  const Displacement left = wall_displacement(field, mesh, smoother, one_round, progress);
+  EvidenceOfGreys evidence(field);
+  const Displacement left = wall_displacement(evidence, mesh, smoother, one_round, progress);
+
   MeshField residual{"residual_mm",
                      Eigen::VectorXd::Constant(tessellation.mesh.points_mm.cols(),
                                                std::numeric_limits<double>::quiet_NaN())};

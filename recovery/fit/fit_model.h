@@ -12,6 +12,7 @@
 #include "recovery/fit/fit_network.h"
 #include "recovery/imaging/image/any_image.h"
 #include "recovery/wall/displacement.h"
+#include "recovery/wall/rician_noise.h"
 
 namespace angiospline {
 

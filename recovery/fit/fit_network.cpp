@@ -54,6 +54,7 @@ class Mover {
         rings_(strip_rings(network)),
         ring_of_(network.patches.size(), -1) {
     wall_.nodes_of.resize(network.patches.size());
+
     for (std::size_t r = 0; r < rings_.size(); ++r) {
       for (std::size_t k = 0; k < rings_[r].patches.size(); ++k) {
         ring_of_[index(rings_[r].patches[k])] = static_cast<int>(r);
@@ -105,6 +106,8 @@ class Mover {
         collect(body, opening, join.reversed, samples[ring_of_[index(opening.patch)]]);
       }
     }
+
+    // A junction without a body: its own rows are the open end.
     for (const Rim& rim : old_.rims) {
       for (const Side& side : rim.sides) {
         if (side.side == PatchSide::kU0 && is_junction_patch(side.patch)) {
@@ -112,6 +115,8 @@ class Mover {
         }
       }
     }
+
+    // The ring nearest to the samples, kept in the opening's plane.
     std::map<int, Vec3> moved;
     for (auto& [r, of_ring] : samples) {
       const StripRing& ring = rings_[index(r)];
@@ -155,8 +160,10 @@ class Mover {
     for (const StripRing& ring : rings_) {
       if (!is_body(ring)) junctions[ring.region].push_back(ring);
     }
+
     std::vector<int> regions;
     for (const auto& [region, of_junction] : junctions) regions.push_back(region);
+
     std::vector<MovedPatches> moved(regions.size());
     std::atomic<std::size_t> done{0};
     tbb::parallel_for(std::size_t{0}, regions.size(), [&](std::size_t k) {
@@ -171,6 +178,7 @@ class Mover {
       }
       progress.at("junctions", static_cast<double>(++done) / static_cast<double>(regions.size()));
     });
+
     for (std::size_t k = 0; k < regions.size(); ++k) take(moved[k], regions[k], result);
   }
 
@@ -224,6 +232,8 @@ class Mover {
       const std::vector<int>& nodes = wall_.nodes_of[index(patch)];
       double area = 0;
       for (const int node : nodes) area += wall_.mass_mm2(node);
+
+      // Patches count alike, whatever their size; within each, nodes by their area.
       for (const int node : nodes) {
         PatchSample s;
         s.patch = patch;
@@ -253,7 +263,9 @@ class Mover {
         if (r < 0 || !is_body(rings_[index(r)])) break;
         collect(side, side, false, samples);
       }
+
       if (samples.empty() || !is_body(rings_[index(r)])) continue;
+
       const StripRing& ring = rings_[index(r)];
       const int row = end == PatchSide::kU0 ? 0 : ring.rows() - 1;
       const Points3 moves = fit_ring(ring, samples);
@@ -270,7 +282,8 @@ class Mover {
     for (const Rim& rim : old_.rims) {
       for (const Side& side : rim.sides) {
         const bool same = side.side == (at_end ? PatchSide::kU1 : PatchSide::kU0);
-        if (same && ring_of_[index(side.patch)] >= 0) is_free[index(ring_of_[index(side.patch)])] = 1;
+        if (same && ring_of_[index(side.patch)] >= 0)
+          is_free[index(ring_of_[index(side.patch)])] = 1;
       }
     }
     return is_free;
@@ -279,6 +292,7 @@ class Mover {
   void move_bodies(MovedNetwork& result, const Progress& progress) const {
     const std::vector<char> free_start = free_next_rows(false);
     const std::vector<char> free_end = free_next_rows(true);
+
     std::vector<BodyFit> fits(rings_.size());
     std::atomic<std::size_t> done{0};
     tbb::parallel_for(std::size_t{0}, rings_.size(), [&](std::size_t r) {
@@ -287,6 +301,8 @@ class Mover {
                          free_start[r] != 0, free_end[r] != 0);
       progress.at("bodies", static_cast<double>(++done) / static_cast<double>(rings_.size()));
     });
+
+    // In the order of the rings, whatever thread was first.
     for (std::size_t r = 0; r < rings_.size(); ++r) {
       const StripRing& ring = rings_[r];
       if (!is_body(ring) || fits[r].points.cols() == 0) continue;
@@ -296,6 +312,7 @@ class Mover {
               fits[r].points.col(i * ring.points() + c);
         }
       }
+
       if (fits[r].share >= 1) continue;
       const std::string why =
           fits[r].share > 0
@@ -322,8 +339,11 @@ class Mover {
           count += 1;
         }
       }
+
+      // In the rim's plane, which stays.
       center /= count;
       rim.center_mm = center - rim.normal.dot(center - rim.center_mm) * rim.normal;
+
       double radius = 0;
       for (const Vec3& p : points) radius += (p - rim.center_mm).norm() / count;
       rim.radius_mm = radius;

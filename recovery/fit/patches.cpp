@@ -11,24 +11,14 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
-#include "kernel/numerics/kkt_system.h"
 #include "kernel/spline/basis.h"
+#include "modeling/junction/patch_solver.h"
+#include "recovery/fit/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kProximal = 0.01;
-constexpr double kCoefficients = 1e-3;
-constexpr double kShift = 1e-12;      // -eps in the corner of the KKT matrix
-constexpr double kLongestStep = 0.3;  // of a control point, in local radii
-constexpr int kSteps = 8;
-constexpr int kPolish = 10;
-constexpr double kSolved = 1e-13;
-constexpr double kStartsSmooth = 1e-8;  // residual of a group that is smooth to begin with
-constexpr double kWorstAngleDeg = 0.005;
-constexpr double kMostTurnedCos = 0.5;
-constexpr int kGateSteps = 12;
-constexpr double kLeastShare = 0.125;  // of the way, at a time
+using namespace fit_rules;
 
 // The points of a side and of the row next to it, along the side's growing parameter.
 using SideRows = std::pair<std::array<int, kPatchSize>, std::array<int, kPatchSize>>;
@@ -54,42 +44,13 @@ SideRows side_rows(const std::array<int, kPatchPoints>& control, PatchSide side)
   return rows;
 }
 
-// Values and first derivatives of the 36 functions at (u, v).
-struct PatchBasis {
-  Eigen::Matrix<double, kPatchPoints, 1> value, u, v;
-};
-PatchBasis patch_basis(const Vec2& uv) {
-  static const KnotVector knots = KnotVector::bezier(kPatchSize - 1);
-  const BasisValues bu = basis_at(knots, uv.x(), 1);
-  const BasisValues bv = basis_at(knots, uv.y(), 1);
-  PatchBasis b;
-  for (int i = 0; i < kPatchSize; ++i) {
-    for (int j = 0; j < kPatchSize; ++j) {
-      b.value(i * kPatchSize + j) = bu.values(0, i) * bv.values(0, j);
-      b.u(i * kPatchSize + j) = bu.values(1, i) * bv.values(0, j);
-      b.v(i * kPatchSize + j) = bu.values(0, i) * bv.values(1, j);
-    }
-  }
-  return b;
-}
-
-using PatchNet = Eigen::Matrix<double, 3, kPatchPoints>;
-PatchNet patch_net(const JunctionNet& net, const std::array<int, kPatchPoints>& control) {
-  PatchNet P;
-  for (int k = 0; k < kPatchPoints; ++k) P.col(k) = net.points.col(control[index(k)]);
-  return P;
-}
-
 // The energy of one patch as a quadratic function of its 108 coordinates: 1/2 p'Hp - r'p.
-struct PatchEnergy {
+struct Quadratic {
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3 * kPatchPoints, 3 * kPatchPoints);
   Eigen::VectorXd r = Eigen::VectorXd::Zero(3 * kPatchPoints);
-  std::vector<std::pair<int, Vec3>> unknowns;  // point of the patch and direction
-  std::vector<int> numbers;                    // of the unknowns
 
   // weight * (sum_k b_k n . p_k - value)^2 / 2
-  void add(const Eigen::Matrix<double, kPatchPoints, 1>& b, const Vec3& n, double value,
-           double weight) {
+  void add(const PatchColumn& b, const Vec3& n, double value, double weight) {
     Eigen::VectorXd row(3 * kPatchPoints);
     for (int k = 0; k < kPatchPoints; ++k) row.segment<3>(3 * k) = b(k) * n;
     H.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
@@ -97,163 +58,131 @@ struct PatchEnergy {
   }
 };
 
-class GroupMover {
+// The squares of a group's distances from its samples' planes, of its way from the samples, of its
+// sines against the planes and of its move's roughness. Tangent lengths are held at those of the
+// start, so that all of it is quadratic: its Hessian is formed once.
+class SampleEnergy {
  public:
-  GroupMover(PatchGroup& group, const std::vector<PatchSample>& samples, double share,
-             const PatchWeights& weights, double roughness)
-      : group_(group),
-        share_(share),
-        weights_(weights),
-        roughness_(roughness),
-        coefficients_(best_coefficients(group.edges, group.net)),
-        energies_(make_energies(samples)),
-        system_(make_system()) {}
-
-  double residual() const {
-    return tangent_plane_residual(group_.edges, group_.net, coefficients_).cwiseAbs().maxCoeff();
+  SampleEnergy(const PatchGroup& group, const std::vector<PatchSample>& samples, double share,
+               const PatchWeights& weights, double roughness)
+      : group_(group), quadratics_(group.patches.size()), models_(group.patches.size()) {
+    for (const PatchSample& s : samples) add_sample(s, share, weights);
+    for (std::size_t p = 0; p < quadratics_.size(); ++p) {
+      add_roughness(p, roughness);
+      quadratics_[p].H = Eigen::MatrixXd(quadratics_[p].H.selfadjointView<Eigen::Lower>());
+      project_on_unknowns(p);
+    }
   }
 
-  // The largest move in local radii; -1: the system could not be solved.
-  double step(bool with_energy) {
-    system_.clear();
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(size() + group_.edges.rows);
-    std::size_t place = 0;
-    for (std::size_t p = 0; p < energies_.size(); ++p) {
-      const PatchEnergy& e = energies_[p];
-      const PatchNet P = patch_net(group_.net, group_.controls[p]);
+  const std::vector<PatchModel>& models() const { return models_; }
+
+  // g = H p - r, on the unknowns.
+  const std::vector<PatchModel>& at(const JunctionNet& net) {
+    for (std::size_t p = 0; p < quadratics_.size(); ++p) {
+      const PatchNet P = patch_net(net, group_.controls[p]);
       const Eigen::VectorXd g =
-          e.H * Eigen::Map<const Eigen::VectorXd>(P.data(), 3 * kPatchPoints) - e.r;
-      for (std::size_t a = 0; a < e.unknowns.size(); ++a) {
-        const auto& [k, da] = e.unknowns[a];
-        if (with_energy) right(e.numbers[a]) -= da.dot(g.segment<3>(3 * k));
-        for (std::size_t b = 0; b <= a; ++b) {
-          const auto& [l, db] = e.unknowns[b];
-          system_.add_hessian(place++, da.dot(e.H.block<3, 3>(3 * k, 3 * l) * db));
-        }
+          quadratics_[p].H * Eigen::Map<const Eigen::VectorXd>(P.data(), 3 * kPatchPoints) -
+          quadratics_[p].r;
+      const auto directions = directions_of(p);
+      for (std::size_t a = 0; a < directions.size(); ++a) {
+        const auto& [k, da] = directions[a];
+        models_[p].gradient(static_cast<Eigen::Index>(a)) = da.dot(g.segment<3>(3 * k));
       }
     }
-    for (std::size_t k = 0; k < group_.net.slots.size(); ++k) {
-      const ControlSlot& slot = group_.net.slots[k];
-      const double weight = kProximal / (group_.net.scale[k] * group_.net.scale[k]);
-      for (int d = 0; d < slot.count; ++d) system_.add_diagonal(slot.first + d, weight);
-    }
-    for (int k = group_.net.unknowns; k < size(); ++k) system_.add_diagonal(k, kCoefficients);
-    system_.clear_jacobian();
-    tangent_plane_jacobian(group_.edges, group_.net, coefficients_, entries_);
-    for (std::size_t e = 0; e < entries_.size(); ++e) system_.add_jacobian(e, entries_[e].value);
-    right.tail(group_.edges.rows) =
-        -tangent_plane_residual(group_.edges, group_.net, coefficients_);
-    if (!system_.factor(kShift)) return -1;
-    const Eigen::VectorXd x = system_.solve(right);
-    return x.allFinite() ? move(x) : -1;
+    return models_;
   }
 
  private:
-  int size() const { return group_.net.unknowns + group_.edges.coefficients; }
+  void add_sample(const PatchSample& s, double share, const PatchWeights& weights) {
+    const int p = group_.index_of(s.patch);
+    if (p < 0) return;
+    const std::array<int, kPatchPoints>& control = group_.controls[index(p)];
+    const PatchBasis b = patch_basis(s.uv);
+    const PatchNet P = patch_net(group_.net, control);
 
-  double move(const Eigen::VectorXd& x) {
-    double longest = 0;
-    for (std::size_t k = 0; k < group_.net.slots.size(); ++k) {
-      const ControlSlot& slot = group_.net.slots[k];
-      if (slot.count == 0) continue;
-      longest = std::max(longest, x.segment(slot.first, slot.count).norm() / group_.net.scale[k]);
+    // Lengths count in local radii, so that thin branches weigh as much as thick ones.
+    double scale = 0;
+    for (int k = 0; k < kPatchPoints; ++k) {
+      scale += b.value(k) * group_.net.scale[index(control[index(k)])];
     }
-    const double part = std::min(1.0, kLongestStep / std::max(longest, 1e-300));
-    group_.net.apply(part * x.head(group_.net.unknowns));
-    coefficients_ += part * x.segment(group_.net.unknowns, group_.edges.coefficients);
-    return longest;
-  }
+    const double per_area = s.weight / (scale * scale);
 
-  std::vector<PatchEnergy> make_energies(const std::vector<PatchSample>& samples) const {
-    std::vector<PatchEnergy> energies(group_.patches.size());
-    for (const PatchSample& s : samples) {
-      const int p = group_.index_of(s.patch);
-      if (p < 0) continue;
-      const std::array<int, kPatchPoints>& control = group_.controls[index(p)];
-      const PatchBasis b = patch_basis(s.uv);
-      const PatchNet P = patch_net(group_.net, control);
-      double scale = 0;
-      for (int k = 0; k < kPatchPoints; ++k) {
-        scale += b.value(k) * group_.net.scale[index(control[index(k)])];
-      }
-      const double per_area = s.weight / (scale * scale);
-      PatchEnergy& e = energies[index(p)];
-      const Vec3 target = s.point_mm + share_ * s.move_mm;
-      const Vec3 normal = ((1 - share_) * s.normal + share_ * s.moved_normal).normalized();
-      e.add(b.value, normal, normal.dot(target), weights_.distance * per_area);
-      for (int d = 0; d < 3; ++d) {
-        e.add(b.value, Vec3::Unit(d), target(d), weights_.anchor * per_area);
-      }
-      e.add(b.u, normal, 0.0, weights_.tangent * s.weight / (P * b.u).squaredNorm());
-      e.add(b.v, normal, 0.0, weights_.tangent * s.weight / (P * b.v).squaredNorm());
+    Quadratic& q = quadratics_[index(p)];
+    const Vec3 target = s.point_mm + share * s.move_mm;
+    const Vec3 normal = ((1 - share) * s.normal + share * s.moved_normal).normalized();
+    q.add(b.value, normal, normal.dot(target), weights.distance * per_area);
+    for (int d = 0; d < 3; ++d) {
+      q.add(b.value, Vec3::Unit(d), target(d), weights.anchor * per_area);
     }
-    for (std::size_t p = 0; p < energies.size(); ++p) {
-      PatchEnergy& e = energies[p];
-      add_roughness(p, e);
-      e.H = Eigen::MatrixXd(e.H.selfadjointView<Eigen::Lower>());
-      for (int k = 0; k < kPatchPoints; ++k) {
-        const ControlSlot& slot = group_.net.slots[index(group_.controls[p][index(k)])];
-        for (int d = 0; d < slot.count; ++d) {
-          e.unknowns.emplace_back(k, slot.count == 1 ? slot.along : Vec3(Vec3::Unit(d)));
-          e.numbers.push_back(slot.first + d);
-        }
-      }
-    }
-    return energies;
+    q.add(b.u, normal, 0.0, weights.tangent * s.weight / (P * b.u).squaredNorm());
+    q.add(b.v, normal, 0.0, weights.tangent * s.weight / (P * b.v).squaredNorm());
   }
 
   // Second differences of the move from where the net is now, along both rows.
-  void add_roughness(std::size_t p, PatchEnergy& energy) const {
+  void add_roughness(std::size_t p, double roughness) {
     const PatchNet P = patch_net(group_.net, group_.controls[p]);
     for (int i = 0; i < kPatchSize; ++i) {
       for (int j = 1; j + 1 < kPatchSize; ++j) {
         for (const auto& [middle, step] :
              {std::pair{i * kPatchSize + j, 1}, std::pair{j * kPatchSize + i, kPatchSize}}) {
           const double scale = group_.net.scale[index(group_.controls[p][index(middle)])];
-          Eigen::Matrix<double, kPatchPoints, 1> b = Eigen::Matrix<double, kPatchPoints, 1>::Zero();
+          PatchColumn b = PatchColumn::Zero();
           b(middle - step) = b(middle + step) = 1;
           b(middle) = -2;
           const Vec3 now = P * b;
           for (int d = 0; d < 3; ++d) {
-            energy.add(b, Vec3::Unit(d), now(d), roughness_ / (scale * scale));
+            quadratics_[p].add(b, Vec3::Unit(d), now(d), roughness / (scale * scale));
           }
         }
       }
     }
   }
 
-  KktSystem make_system() {
-    std::vector<KktSystem::Place> hessian, jacobian;
-    for (const PatchEnergy& e : energies_) {
-      for (std::size_t a = 0; a < e.numbers.size(); ++a) {
-        for (std::size_t b = 0; b <= a; ++b) {
-          hessian.emplace_back(std::max(e.numbers[a], e.numbers[b]),
-                               std::min(e.numbers[a], e.numbers[b]));
-        }
+  // Points of a patch with the directions in which they may move, one for each unknown.
+  std::vector<std::pair<int, Vec3>> directions_of(std::size_t p) const {
+    std::vector<std::pair<int, Vec3>> all;
+    for (int k = 0; k < kPatchPoints; ++k) {
+      const ControlSlot& slot = group_.net.slots[index(group_.controls[p][index(k)])];
+      for (int d = 0; d < slot.count; ++d) {
+        all.emplace_back(k, slot.count == 1 ? slot.along : Vec3(Vec3::Unit(d)));
       }
     }
-    tangent_plane_jacobian(group_.edges, group_.net, coefficients_, entries_);
-    for (const JacobianEntry& e : entries_) jacobian.emplace_back(e.row, e.column);
-    return KktSystem(size(), group_.edges.rows, hessian, jacobian);
+    return all;
   }
 
-  PatchGroup& group_;
-  double share_;  // of the way
-  PatchWeights weights_;
-  double roughness_;
-  Eigen::VectorXd coefficients_;
-  std::vector<PatchEnergy> energies_;
-  std::vector<JacobianEntry> entries_;
-  KktSystem system_;
+  void project_on_unknowns(std::size_t p) {
+    PatchModel& model = models_[p];
+    for (const int id : group_.controls[p]) {
+      const ControlSlot& slot = group_.net.slots[index(id)];
+      for (int d = 0; d < slot.count; ++d) model.unknowns.push_back(slot.first + d);
+    }
+
+    const auto directions = directions_of(p);
+    const Eigen::Index count = std::ssize(directions);
+    model.gradient = Eigen::VectorXd::Zero(count);
+    model.hessian = Eigen::MatrixXd::Zero(count, count);
+    for (Eigen::Index a = 0; a < count; ++a) {
+      const auto& [k, da] = directions[index(a)];
+      for (Eigen::Index b = 0; b <= a; ++b) {
+        const auto& [l, db] = directions[index(b)];
+        model.hessian(a, b) = da.dot(quadratics_[p].H.block<3, 3>(3 * k, 3 * l) * db);
+      }
+    }
+  }
+
+  const PatchGroup& group_;
+  std::vector<Quadratic> quadratics_;
+  std::vector<PatchModel> models_;
 };
 
 double worst_angle_deg(const PatchGroup& group) {
   static const KnotVector knots = KnotVector::bezier(kPatchSize - 1);
   double worst = 0;
-  constexpr int kSamples = 24;
   for (const SmoothEdge& edge : group.edges.edges) {
-    for (int s = 0; s <= kSamples; ++s) {
-      const BasisValues b = basis_at(knots, static_cast<double>(s) / kSamples, 1);
+    for (int s = 0; s <= kGroupGates.edge_steps; ++s) {
+      const BasisValues b = basis_at(knots, static_cast<double>(s) / kGroupGates.edge_steps, 1);
+
+      // H', and F and G up to a factor: the derivatives across are five times the first rows.
       Vec3 along = Vec3::Zero(), f = Vec3::Zero(), g = Vec3::Zero();
       for (int k = 0; k < kPatchSize; ++k) {
         const Vec3 h = group.net.points.col(edge.h[index(k)]);
@@ -261,6 +190,7 @@ double worst_angle_deg(const PatchGroup& group) {
         f += b.values(0, k) * (group.net.points.col(edge.f[index(k)]) - h);
         g += b.values(0, k) * (group.net.points.col(edge.g[index(k)]) - h);
       }
+
       const Vec3 one = along.cross(f), other = g.cross(along);
       worst = std::max(worst, std::atan2(one.cross(other).norm(), one.dot(other)));
     }
@@ -273,6 +203,7 @@ SmoothEdge edge_of(const PatchGroup& group, const Join& join, int ratio_degree) 
   const auto a = index(group.index_of(join.a.patch)), b = index(group.index_of(join.b.patch));
   SmoothEdge edge;
   edge.scale = 0;
+
   const SideRows one = side_rows(group.controls[a], join.a.side);
   SideRows other = side_rows(group.controls[b], join.b.side);
   if (join.reversed) std::reverse(other.second.begin(), other.second.end());
@@ -295,20 +226,14 @@ void append_edge(PatchGroup& group, SmoothEdge edge) {
 // Moves the net to its samples; what went wrong, or nothing.
 std::string move_to_samples(PatchGroup& group, const std::vector<PatchSample>& samples,
                             double share, const PatchWeights& weights, double roughness) {
-  GroupMover mover(group, samples, share, weights, roughness);
-  for (int k = 0; k < kSteps; ++k) {
-    const double moved = mover.step(true);
-    if (moved < 0) return "its equations could not be solved";
-    if (moved < 1e-3) break;
-  }
-  double left = mover.residual();
-  for (int k = 0; k < kPolish && left > kSolved; ++k) {
-    if (mover.step(false) < 0) return "its equations could not be solved";
-    const double now = mover.residual();
-    if (now > 0.5 * left && now < 1e-10) break;
-    left = now;
-  }
-  return {};
+  SampleEnergy energy(group, samples, share, weights, roughness);
+  PatchSolver solver(group.net, group.edges, energy.models(), kPatchSteps);
+  const auto at_net = [&](const JunctionNet& net) -> const std::vector<PatchModel>& {
+    return energy.at(net);
+  };
+  const ConstrainedSolution solution =
+      solve_constrained(solver, group.net, at_net, kConstrainedSteps);
+  return solution.solved ? std::string() : "its equations could not be solved";
 }
 
 // Normals (not normalised) of every patch on a grid.
@@ -318,9 +243,9 @@ PatchNormals normals_of(const PatchGroup& group) {
   for (const std::array<int, kPatchPoints>& control : group.controls) {
     const PatchNet P = patch_net(group.net, control);
     std::vector<Vec3> normals;
-    for (int i = 0; i <= kGateSteps; ++i) {
-      for (int j = 0; j <= kGateSteps; ++j) {
-        const PatchBasis b = patch_basis(Vec2(i, j) / kGateSteps);
+    for (int i = 0; i <= kGroupGates.steps; ++i) {
+      for (int j = 0; j <= kGroupGates.steps; ++j) {
+        const PatchBasis b = patch_basis(Vec2(i, j) / kGroupGates.steps);
         normals.push_back((P * b.u).cross(P * b.v));
       }
     }
@@ -348,20 +273,23 @@ std::string first_gate_failed(const PatchGroup& group, const PatchNormals& befor
   const auto normals = normals_of(group);
   figures.jacobian_ratio = jacobian_ratio(normals);
   figures.worst_angle_deg = worst_angle_deg(group);
+
   double least_cos = 1;
   for (std::size_t p = 0; p < normals.size(); ++p) {
     for (std::size_t k = 0; k < normals[p].size(); ++k) {
       least_cos = std::min(least_cos, normals[p][k].normalized().dot(before[p][k].normalized()));
     }
   }
-  if (!(figures.worst_angle_deg <= kWorstAngleDeg)) {
+
+  if (!(figures.worst_angle_deg <= kGroupGates.worst_angle_deg)) {
     return fmt::format("normals of neighbouring patches would differ by {:.2g} degrees",
                        figures.worst_angle_deg);
   }
   if (!(figures.jacobian_ratio >= least_jacobian)) {
     return fmt::format("it would fold (Jacobian ratio {:.2g})", figures.jacobian_ratio);
   }
-  if (!(least_cos >= kMostTurnedCos)) return "a normal would turn by more than 60 degrees";
+  if (!(least_cos >= kGroupGates.most_turned_cos))
+    return "a normal would turn by more than 60 degrees";
   return {};
 }
 
@@ -375,6 +303,8 @@ int PatchGroup::index_of(int patch) const {
 PatchGroup patch_group(const SurfaceNetwork& network, const std::vector<int>& patches) {
   PatchGroup group;
   group.patches = patches;
+
+  // The group's own numbers for the pool's columns, in the order in which patches come to them.
   std::map<int, int> number;
   for (const int p : patches) {
     std::array<int, kPatchPoints> control;
@@ -386,6 +316,7 @@ PatchGroup patch_group(const SurfaceNetwork& network, const std::vector<int>& pa
     }
     group.controls.push_back(control);
   }
+
   group.net.points.resize(3, static_cast<Eigen::Index>(group.columns.size()));
   for (std::size_t k = 0; k < group.columns.size(); ++k) {
     group.net.points.col(static_cast<Eigen::Index>(k)) =
@@ -417,20 +348,25 @@ void add_leg(PatchGroup& group, const Join& join, int ratio_degree, const Vec3& 
 
 bool is_smooth(const PatchGroup& group) {
   const Eigen::VectorXd c = best_coefficients(group.edges, group.net);
-  return tangent_plane_residual(group.edges, group.net, c).cwiseAbs().maxCoeff() < kStartsSmooth;
+  return tangent_plane_residual(group.edges, group.net, c).cwiseAbs().maxCoeff() <
+         kGroupGates.starts_smooth;
 }
 
 double jacobian_ratio(const PatchGroup& group) { return jacobian_ratio(normals_of(group)); }
 
 MovedGroup move_group(PatchGroup& group, const std::vector<PatchSample>& samples,
                       const Points3& start, const PatchWeights& weights,
-                      const std::vector<double>& roughness, double least_jacobian) {
+                      std::span<const double> roughness, double least_jacobian) {
   const PatchNormals before = normals_of(group);
   MovedGroup result;
   Points3 sound = group.net.points;
-  for (double step = 1.0; result.share < 1 && step >= kLeastShare;) {
+
+  // The whole way first; then half of what is left whenever a part fails its gates.
+  for (double step = 1.0; result.share < 1 && step >= kGroupGates.least_share;) {
     const double share = std::min(1.0, result.share + step);
     MovedGroup tried;
+
+    // The least roughness that passes follows the samples best.
     for (const double r : roughness) {
       group.net.points = sound + (share - result.share) * start;
       tried.failure = move_to_samples(group, samples, share, weights, r);
@@ -439,6 +375,7 @@ MovedGroup move_group(PatchGroup& group, const std::vector<PatchSample>& samples
       }
       if (tried.failure.empty()) break;
     }
+
     if (tried.failure.empty()) {
       sound = group.net.points;
       tried.share = share;
@@ -449,6 +386,7 @@ MovedGroup move_group(PatchGroup& group, const std::vector<PatchSample>& samples
       step /= 2;
     }
   }
+
   if (result.share >= 1) result.failure.clear();
   group.net.points = sound;
   return result;

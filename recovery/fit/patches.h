@@ -2,17 +2,16 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "modeling/junction/patch_basis.h"
 #include "modeling/junction/tangent_plane_rows.h"
 #include "modeling/junction/unknowns.h"
 #include "modeling/network/surface_network.h"
 
 namespace angiospline {
-
-inline constexpr int kPatchSize = 6;
-inline constexpr int kPatchPoints = kPatchSize * kPatchSize;
 
 // A place of the group's surface and where it should lie.
 struct PatchSample {
@@ -65,8 +64,8 @@ struct MovedGroup {
   double jacobian_ratio = 0.0;
 };
 
-// Moves the net to its samples: least squares under F' + rho G' = nu H' on all edges, by
-// Gauss-Newton steps on the KKT system, then by steps on the equations alone. `start` (a column a
+// Moves the net to its samples: least squares under F' + rho G' = nu H' on all edges, by the steps
+// of modeling/junction/patch_solver.h. `start` (a column a
 // point) is what the points do before, over the whole way; points without unknowns do only that.
 // Gates: normals of neighbours within 0.005 degrees, |Su x Sv| over its mean at least
 // `least_jacobian`, no normal turned by more than 60 degrees. Each value of `roughness` is tried
@@ -74,7 +73,7 @@ struct MovedGroup {
 // on down to an eighth: the net stays at the last place that passed.
 MovedGroup move_group(PatchGroup& group, const std::vector<PatchSample>& samples,
                       const Points3& start, const PatchWeights& weights,
-                      const std::vector<double>& roughness, double least_jacobian);
+                      std::span<const double> roughness, double least_jacobian);
 
 // The least |Su x Sv| over its mean on the same patch.
 double jacobian_ratio(const PatchGroup& group);

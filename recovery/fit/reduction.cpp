@@ -13,9 +13,12 @@
 #include "kernel/evaluate/curvature.h"
 #include "kernel/fit/fit.h"
 #include "kernel/spline/basis.h"
+#include "recovery/fit/rules.h"
 
 namespace angiospline {
 namespace {
+
+using namespace fit_rules;
 
 // Unit normal of the plane of a closed polygon (Newell).
 Vec3 plane_of_row(const Points3& row) {
@@ -42,12 +45,15 @@ class CrossSections {
       centers.col(i) = rows_.back().rowwise().mean();
     }
     find_axis(BSplineCurve<3>(ring.u, centers));
-    weights_ = Eigen::MatrixXd::Zero(kAround * std::ssize(patches_), n_);
+
+    // A place of a section as a row over the ring's control points.
+    weights_ = Eigen::MatrixXd::Zero(kReduction.around * std::ssize(patches_), n_);
     for (std::size_t k = 0; k < patches_.size(); ++k) {
-      for (int a = 0; a < kAround; ++a) {
-        const BasisValues b = basis_at(patches_[k].v(), static_cast<double>(a) / kAround, 0);
+      for (int a = 0; a < kReduction.around; ++a) {
+        const BasisValues b =
+            basis_at(patches_[k].v(), static_cast<double>(a) / kReduction.around, 0);
         for (int j = 0; j <= kPerPatch; ++j) {
-          weights_(static_cast<Eigen::Index>(k) * kAround + a,
+          weights_(static_cast<Eigen::Index>(k) * kReduction.around + a,
                    (kPerPatch * static_cast<int>(k) + j) % n_) += b.values(0, j);
         }
       }
@@ -67,17 +73,19 @@ class CrossSections {
     const Vec3 a = axis_->at(s), normal = axis_->at(s, 1).normalized();
     Section section{Eigen::MatrixXd(weights_.rows(), 3), Eigen::MatrixXd(weights_.rows(), 3), {}};
     for (std::size_t k = 0; k < patches_.size(); ++k) {
-      for (int j = 0; j < kAround; ++j) {
-        const double v = static_cast<double>(j) / kAround;
+      for (int j = 0; j < kReduction.around; ++j) {
+        const double v = static_cast<double>(j) / kReduction.around;
         const auto u = t <= 0   ? std::optional(ring_.u.first())
                        : t >= 1 ? std::optional(ring_.u.last())
                                 : cut(patches_[k], v, a, normal, guess(t));
         if (!u) return {};
-        const auto row = static_cast<Eigen::Index>(k) * kAround + j;
+        const auto row = static_cast<Eigen::Index>(k) * kReduction.around + j;
         section.points.row(row) = patches_[k].at(*u, v).transpose();
         section.normals.row(row) = normal_vector(patches_[k], *u, v).normalized().transpose();
       }
     }
+
+    // The ring nearest to these points that keeps its seams; at the ends the rows themselves.
     section.ring = (basis_ * solver_.solve(section.points)).transpose();
     if (t <= 0) section.ring = rows_.front();
     if (t >= 1) section.ring = rows_.back();
@@ -104,19 +112,16 @@ class CrossSections {
   }
 
  private:
-  static constexpr int kAround = 8;  // places of a section, on each patch
-
   // A smooth curve through the rings' centres, square to both ends' planes, over its length.
   void find_axis(const BSplineCurve<3>& centers) {
-    constexpr int kSteps = 16;          // of each span
-    constexpr double kRowsASpan = 3.0;  // of the smooth axis
+    // The curve of the centres over its length, as a polygon.
     const std::vector<double> breaks = ring_.u.breakpoints();
     std::vector<Vec3> points{centers.at(breaks.front())};
     us_ = {breaks.front()};
     lengths_ = {0.0};
     for (std::size_t b = 0; b + 1 < breaks.size(); ++b) {
-      for (int k = 1; k <= kSteps; ++k) {
-        us_.push_back(breaks[b] + (breaks[b + 1] - breaks[b]) * k / kSteps);
+      for (int k = 1; k <= kReduction.steps_a_span; ++k) {
+        us_.push_back(breaks[b] + (breaks[b + 1] - breaks[b]) * k / kReduction.steps_a_span);
         points.push_back(centers.at(us_.back()));
         lengths_.push_back(lengths_.back() + (points.back() - points[points.size() - 2]).norm());
       }
@@ -124,7 +129,9 @@ class CrossSections {
     length_ = lengths_.back();
     if (!(length_ > 0)) return;
     for (double& l : lengths_) l /= length_;
-    const int spans = std::max(1, static_cast<int>(ring_.rows() / kRowsASpan) - 1);
+
+    // A smooth axis: a third of the rows' freedom, square to the planes of both ends.
+    const int spans = std::max(1, static_cast<int>(ring_.rows() / kReduction.rows_a_span) - 1);
     std::vector<double> ends;
     for (int k = 0; k <= spans; ++k) ends.push_back(static_cast<double>(k) / spans);
     CurveFitOptions<3> held;
@@ -152,9 +159,12 @@ class CrossSections {
     const double first = patch.u().first(), last = patch.u().last();
     for (int k = 0; k < 30; ++k) {
       const SurfaceJet jet = surface_jet(patch, u, v);
+
       const double off = normal.dot(jet.point - a), slope = normal.dot(jet.u);
       if (!(slope > 0)) return {};
       const double next = std::clamp(u - off / slope, first, last);
+
+      // A line that ends before the plane comes to rest at its end, away from it.
       if (std::abs(next - u) < 1e-12 * (last - first)) {
         if (std::abs(off) > 1e-7 * jet.u.norm() * (last - first)) return {};
         return next;
@@ -184,61 +194,91 @@ struct ReducedRing {
   std::vector<Points3> rows;
 };
 
+// The body's sections at even places of its axis; none if one of them is not within the tolerance
+// of its own ring, or the planes do not cut the body across.
+struct Cuts {
+  std::vector<double> places;
+  std::vector<CrossSections::Section> sections;
+};
+std::optional<Cuts> even_cuts(const CrossSections& body, int count, double tolerance_mm) {
+  Cuts cuts;
+  for (int k = 0; k <= count; ++k) {
+    cuts.places.push_back(static_cast<double>(k) / count);
+    auto section = body.at_fraction(cuts.places.back());
+    if (!section || body.distance_mm(*section, section->ring) > tolerance_mm) return {};
+    cuts.sections.push_back(std::move(*section));
+  }
+  return cuts;
+}
+
+// A body on fewer knots, and its rings of control points at the cuts.
+struct Trial {
+  ReducedRing reduced;
+  std::vector<Points3> rings;
+};
+
+// Every line of control points along the body fitted with so many equal spans, ends held; nothing
+// if a fit cannot be solved.
+std::optional<Trial> trial_with(int spans, const CrossSections& body, const Cuts& cuts,
+                                int points) {
+  std::vector<double> breaks;
+  for (int k = 0; k <= spans; ++k) breaks.push_back(static_cast<double>(k) / spans);
+  Trial trial{{KnotVector::clamped(kPerPatch, breaks), {}},
+              std::vector<Points3>(cuts.sections.size(), Points3(3, points))};
+  ReducedRing& reduced = trial.reduced;
+  reduced.rows.assign(index(reduced.knots.control_point_count()), Points3(3, points));
+
+  for (int c = 0; c < points; ++c) {
+    Points3 line(3, std::ssize(cuts.sections));
+    for (std::size_t k = 0; k < cuts.sections.size(); ++k) {
+      line.col(static_cast<Eigen::Index>(k)) = cuts.sections[k].ring.col(c);
+    }
+    CurveFitOptions<3> held;
+    held.first = {Vec3(cuts.sections.front().ring.col(c)), body.held_derivative(false)};
+    held.last = {Vec3(cuts.sections.back().ring.col(c)), body.held_derivative(true)};
+    const auto fit = fit_curve<3>(reduced.knots, cuts.places, line, held);
+    if (!fit) return {};
+
+    for (std::size_t i = 0; i < reduced.rows.size(); ++i) {
+      reduced.rows[i].col(c) = fit->curve.control_points().col(static_cast<Eigen::Index>(i));
+    }
+    for (std::size_t k = 0; k < cuts.sections.size(); ++k) {
+      trial.rings[k].col(c) = fit->curve.at(cuts.places[k]);
+    }
+  }
+  return trial;
+}
+
+// Whether steps along every line keep most of what they were: nothing comes near to folding.
+bool keeps_steps(const Trial& trial, const Cuts& cuts) {
+  for (std::size_t k = 0; k + 1 < cuts.sections.size(); ++k) {
+    for (Eigen::Index c = 0; c < trial.rings[k].cols(); ++c) {
+      const Vec3 step = cuts.sections[k + 1].ring.col(c) - cuts.sections[k].ring.col(c);
+      const Vec3 now = trial.rings[k + 1].col(c) - trial.rings[k].col(c);
+      if (!(now.dot(step) >= kReduction.least_step * step.squaredNorm())) return false;
+    }
+  }
+  return true;
+}
+
 // The body over the length of its axis with the fewest equal spans, of a growing series, that leave
 // it within the tolerance along its normals. Nothing if that takes as many as it has.
 std::optional<ReducedRing> reduced_ring(const SurfaceNetwork& network, const StripRing& ring,
                                         double tolerance_mm) {
-  constexpr int kSections = 4;        // for each row of the ring
-  constexpr double kLeastStep = 0.7;  // of the steps between sections
-  const CrossSections sections(network, ring);
-  if (!sections.has_axis()) return {};
-  std::vector<double> places;
-  std::vector<CrossSections::Section> cuts;
-  const int count = kSections * ring.rows();
-  for (int k = 0; k <= count; ++k) {
-    places.push_back(static_cast<double>(k) / count);
-    auto section = sections.at_fraction(places.back());
-    if (!section || sections.distance_mm(*section, section->ring) > tolerance_mm) return {};
-    cuts.push_back(std::move(*section));
-  }
-  const int n = ring.points();
+  const CrossSections body(network, ring);
+  if (!body.has_axis()) return {};
+  const auto cuts = even_cuts(body, kReduction.sections_a_row * ring.rows(), tolerance_mm);
+  if (!cuts) return {};
+
   for (int spans = 1; spans + kPerPatch < ring.rows(); spans = std::max(spans + 1, spans * 5 / 4)) {
-    std::vector<double> breaks;
-    for (int k = 0; k <= spans; ++k) breaks.push_back(static_cast<double>(k) / spans);
-    ReducedRing reduced{KnotVector::clamped(kPerPatch, breaks), {}};
-    std::vector<Points3> trial(cuts.size(), Points3(3, n));
-    reduced.rows.assign(index(reduced.knots.control_point_count()), Points3(3, n));
-    bool solved = true;
-    for (int c = 0; c < n && solved; ++c) {
-      Points3 points(3, static_cast<Eigen::Index>(cuts.size()));
-      for (std::size_t k = 0; k < cuts.size(); ++k) {
-        points.col(static_cast<Eigen::Index>(k)) = cuts[k].ring.col(c);
-      }
-      CurveFitOptions<3> held;
-      held.first = {Vec3(cuts.front().ring.col(c)), sections.held_derivative(false)};
-      held.last = {Vec3(cuts.back().ring.col(c)), sections.held_derivative(true)};
-      const auto fit = fit_curve<3>(reduced.knots, places, points, held);
-      solved = fit.has_value();
-      if (!solved) break;
-      for (std::size_t i = 0; i < reduced.rows.size(); ++i) {
-        reduced.rows[i].col(c) = fit->curve.control_points().col(static_cast<Eigen::Index>(i));
-      }
-      for (std::size_t k = 0; k < cuts.size(); ++k) trial[k].col(c) = fit->curve.at(places[k]);
-    }
+    auto trial = trial_with(spans, body, *cuts, ring.points());
+    if (!trial || !keeps_steps(*trial, *cuts)) continue;
+
     double farthest = 0;
-    for (std::size_t k = 0; k < cuts.size() && solved; ++k) {
-      farthest = std::max(farthest, sections.distance_mm(cuts[k], trial[k]));
+    for (std::size_t k = 0; k < cuts->sections.size(); ++k) {
+      farthest = std::max(farthest, body.distance_mm(cuts->sections[k], trial->rings[k]));
     }
-    // Steps along every line keep most of what they were: nothing comes near to folding.
-    bool sound = solved;
-    for (std::size_t k = 0; k + 1 < cuts.size() && sound; ++k) {
-      for (int c = 0; c < n && sound; ++c) {
-        const Vec3 step = cuts[k + 1].ring.col(c) - cuts[k].ring.col(c);
-        const Vec3 now = trial[k + 1].col(c) - trial[k].col(c);
-        sound = now.dot(step) >= kLeastStep * step.squaredNorm();
-      }
-    }
-    if (sound && farthest <= tolerance_mm) return reduced;
+    if (farthest <= tolerance_mm) return std::move(trial->reduced);
   }
   return {};
 }
@@ -248,6 +288,7 @@ std::optional<ReducedRing> reduced_ring(const SurfaceNetwork& network, const Str
 SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_mm) {
   EXPECTS(tolerance_mm > 0);
   SurfaceNetwork fewer = network;
+
   std::vector<StripRing> rings;
   for (StripRing& ring : strip_rings(network)) {
     const bool body = network.regions[index(ring.region)].kind == RegionKind::kBody;
@@ -257,6 +298,8 @@ SurfaceNetwork with_fewer_knots(const SurfaceNetwork& network, double tolerance_
   tbb::parallel_for(std::size_t{0}, rings.size(), [&](std::size_t r) {
     reduced[r] = reduced_ring(network, rings[r], tolerance_mm);
   });
+
+  // New columns between the end rows, which bodies share with junctions and rims.
   std::vector<Vec3> pool;
   for (Eigen::Index c = 0; c < network.control_points_mm.cols(); ++c) {
     pool.push_back(network.control_points_mm.col(c));

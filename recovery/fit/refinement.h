@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "recovery/wall/displacement.h"
+#include "modeling/network/surface_network.h"
+#include "recovery/wall/evidence.h"
 
 namespace angiospline {
 
@@ -27,9 +28,10 @@ struct LargeResiduals {
   void leave_out(const FitMesh& mesh, int region);
 };
 
-// Measures the wall from where the mesh is. Regions with `excluded` set are not looked at.
-LargeResiduals large_residuals(const GreyField& field, const SurfaceNetwork& network,
-                               const FitMesh& mesh, MeshSmoother& smoother, const WallGreys& greys,
+// Measures the wall from where the mesh is, by evidence that has looked at it. Regions with
+// `excluded` set are not looked at.
+LargeResiduals large_residuals(const Evidence& evidence, const SurfaceNetwork& network,
+                               const FitMesh& mesh, MeshSmoother& smoother,
                                const std::vector<char>& excluded,
                                const ResidualOptions& options = {});
 
@@ -47,7 +49,7 @@ struct LocallyRefinedNetwork {
   std::vector<std::string> regions;
 };
 LocallyRefinedNetwork refined_where_large(const SurfaceNetwork& network, const FitMesh& mesh,
-                                   const LargeResiduals& residuals, const Eigen::VectorXd& share,
-                                   double shortest_mm);
+                                          const LargeResiduals& residuals,
+                                          const Eigen::VectorXd& share, double shortest_mm);
 
 }  // namespace angiospline

@@ -8,17 +8,14 @@
 #include "base/median.h"
 #include "modeling/check/certificate.h"
 #include "recovery/fit/refinement.h"
+#include "recovery/fit/rules.h"
+#include "recovery/wall/evidence_of_greys.h"
 #include "recovery/wall/wall_mesh_part.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kRimVox = 4.0;           // of an end: what an end does to a wall is no residual
-constexpr double kProgress = 0.7;         // of large residuals left, for another round
-constexpr double kShortestSpanVox = 1.0;  // of a body, where residuals are large
-constexpr double kReachRadii = 0.5;       // around large residuals that moves die out over
-constexpr double kShareReach = 4.0;       // times that: shares are none beyond
-constexpr double kLongestWaveVox = 16.0;  // how far beyond those a smooth wall feels them, at most
+using namespace fit_rules;
 
 bool listed(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -65,7 +62,9 @@ class Refit {
         excluded_(network.regions.size(), 0),
         amounts_(network.regions.size(), std::numeric_limits<double>::infinity()) {
     spacing_.voxel_mm = field.voxel_mm();
-    spacing_.rim_margin_vox = kRimVox;
+    spacing_.rim_margin_vox = kRefit.rim_vox;
+
+    // What could not be moved before is not looked at.
     for (std::size_t r = 0; r < excluded_.size(); ++r) {
       const std::string& name = network.regions[r].name;
       excluded_[r] = listed(report.held, name) || listed(report.without_edge, name);
@@ -92,17 +91,19 @@ class Refit {
     if (!mesh) return fail(mesh.error());
     const FitMeshPart part =
         first ? whole_of(std::move(*mesh)) : part_near(*mesh, places_, reach_mm());
+
     MeshSmoother smoother(part.mesh);
     if (first) measure_levels(part.mesh, smoother);
-    LargeResiduals large =
-        large_residuals(field_, network_, part.mesh, smoother,
-                        first ? levels_.greys : levels_.on(part.mesh), excluded_);
+    const EvidenceOfGreys evidence(field_, first ? levels_.greys : levels_.on(part.mesh));
+    LargeResiduals large = large_residuals(evidence, network_, part.mesh, smoother, excluded_);
+
     leave_out_stuck(part.mesh, large);
     if (progress_.should_stop()) return fail(cancelled("refinement"));
     if (!large.any()) return false;
+
     const Eigen::VectorXd share = share_of(part.mesh, large.large, smoother);
-    const LocallyRefinedNetwork finer = refined_where_large(network_, part.mesh, large, share,
-                                                     kShortestSpanVox * field_.voxel_mm());
+    const LocallyRefinedNetwork finer = refined_where_large(
+        network_, part.mesh, large, share, kRefit.shortest_span_vox * field_.voxel_mm());
     mark_places(part.mesh, large.large);
     return move(finer, part.mesh, large, waves);
   }
@@ -110,10 +111,12 @@ class Refit {
   void measure_levels(const FitMesh& mesh, MeshSmoother& smoother) {
     levels_ = {mesh, wall_greys(field_, mesh, smoother, Eigen::VectorXd::Zero(mesh.size()))};
     around_mm_ = std::max(ResidualOptions().mean_vox * field_.voxel_mm(),
-                          kReachRadii * median(mesh.radii_mm));
+                          kRefit.reach_radii * median(mesh.radii_mm));
   }
 
-  double reach_mm() const { return kShareReach * around_mm_ + kLongestWaveVox * field_.voxel_mm(); }
+  double reach_mm() const {
+    return kRefit.share_reach * around_mm_ + kRefit.longest_wave_vox * field_.voxel_mm();
+  }
 
   void mark_places(const FitMesh& mesh, const std::vector<char>& large) {
     std::vector<Vec3> points;
@@ -140,7 +143,7 @@ class Refit {
   void leave_out_stuck(const FitMesh& mesh, LargeResiduals& large) {
     for (std::size_t r = 0; r < excluded_.size(); ++r) {
       if (!large.regions[r] || amounts_[r] == 0) continue;
-      if (large.amounts_mm3[r] < kProgress * amounts_[r]) continue;
+      if (large.amounts_mm3[r] < kRefit.progress * amounts_[r]) continue;
       excluded_[r] = 1;
       large.leave_out(mesh, static_cast<int>(r));
     }
@@ -155,15 +158,19 @@ class Refit {
     if (!mesh) return fail(mesh.error());
     const FitMeshPart part = part_near(*mesh, places_, reach_mm());
     MeshSmoother smoother(part.mesh);
-    const WallGreys greys = levels_.on(part.mesh);
+
+    EvidenceOfGreys evidence(field_, levels_.on(part.mesh));
     DisplacementOptions local = options_.displacement;
     local.wave_factors = {waves};
-    local.greys = &greys;
-    const Displacement wall = wall_displacement(field_, part.mesh, smoother, local, progress_);
+    const Displacement wall = wall_displacement(evidence, part.mesh, smoother, local, progress_);
     report_.iterations += static_cast<int>(local.half_windows_vox.size());
+
+    // Marks go over to the finer mesh by the nearest nodes.
     std::vector<char> marks(part.mesh.nodes.size(), 0);
     const std::vector<int> nearest = nearest_nodes(looked_at, part.mesh);
     for (std::size_t k = 0; k < marks.size(); ++k) marks[k] = large.large[index(nearest[k])];
+
+    // Regions that cannot move are left out, the others tried without them.
     while (std::find(marks.begin(), marks.end(), char{1}) != marks.end()) {
       if (progress_.should_stop()) return fail(cancelled("refinement"));
       const Eigen::VectorXd share = share_of(part.mesh, marks, smoother);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "recovery/fit/fit_model.h"
+#include "recovery/wall/wall_profile.h"
 
 namespace angiospline {
 

@@ -87,6 +87,8 @@ std::vector<StripRing> strip_rings(const SurfaceNetwork& network) {
   std::vector<StripRing> rings;
   for (std::size_t first = 0; first < next.size(); ++first) {
     if (used[first]) continue;
+
+    // On from patch to patch; what does not come back is no ring.
     StripRing ring;
     int p = static_cast<int>(first);
     while (p >= 0 && !used[index(p)]) {
@@ -95,6 +97,7 @@ std::vector<StripRing> strip_rings(const SurfaceNetwork& network) {
       p = next[index(p)];
     }
     if (p != static_cast<int>(first)) continue;
+
     const Patch& patch = network.patches[first];
     ring.region = patch.region;
     ring.u = patch.u;
@@ -108,6 +111,7 @@ std::vector<StripRing> strip_rings(const SurfaceNetwork& network) {
         }
       }
     }
+
     for (int k = 0; k < n; ++k) ring.seam_ratios.push_back(seam_ratio(network, ring, k));
     rings.push_back(std::move(ring));
   }
@@ -141,11 +145,13 @@ std::vector<double> finer_knots(const SurfaceNetwork& network, const StripRing& 
   }
   const BSplineCurve<3> axis(ring.u, centers);
   const BSplineCurve<1> size(ring.u, sizes.transpose());
+
   std::vector<double> added;
   const std::vector<double> breaks = ring.u.breakpoints();
   for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
     const double from = breaks[k], to = breaks[k + 1];
     double length = 0, radius = 0;
+
     constexpr int kSamples = 16;
     Vec3 before = axis.at(from);
     for (int s = 1; s <= kSamples; ++s) {
@@ -155,6 +161,8 @@ std::vector<double> finer_knots(const SurfaceNetwork& network, const StripRing& 
       before = p;
       radius += size.at(t)(0) / kSamples;
     }
+
+    // Bisected until no part is longer than it may be.
     int parts = 1;
     while (length > parts * radii * radius && parts < 4096) parts *= 2;
     for (int s = 1; s < parts; ++s) added.push_back(from + (to - from) * s / parts);
@@ -186,6 +194,7 @@ SurfaceNetwork compacted(SurfaceNetwork network) {
     if (n < 0) n = count++;
     column = n;
   };
+
   for (Patch& patch : network.patches) {
     for (int& c : patch.control) use(c);
   }
@@ -193,6 +202,7 @@ SurfaceNetwork compacted(SurfaceNetwork network) {
     use(d.point);
     for (auto& [master, weight] : d.masters) use(master);
   }
+
   Points3 kept(3, count);
   for (std::size_t c = 0; c < number.size(); ++c) {
     if (number[c] >= 0) {
@@ -211,15 +221,19 @@ SurfaceNetwork with_knots_added(const SurfaceNetwork& network, const std::vector
   for (Eigen::Index c = 0; c < network.control_points_mm.cols(); ++c) {
     pool.push_back(network.control_points_mm.col(c));
   }
+
   for (std::size_t r = 0; r < rings.size(); ++r) {
     if (added[r].empty()) continue;
     const StripRing& ring = rings[r];
     EXPECTS(network.regions[index(ring.region)].kind == RegionKind::kBody);
+
     const KnotVector u = with_knots(ring.u, added[r]).value();
     const int rows = u.control_point_count();
     Eigen::MatrixXi columns(rows, ring.points());
     columns.row(0) = ring.columns.row(0);
     columns.row(rows - 1) = ring.columns.row(ring.rows() - 1);
+
+    // Rows between the ends are the ring's own; those at the ends are shared.
     for (std::size_t k = 0; k < ring.patches.size(); ++k) {
       const BSplineSurface<3> old = patch_surface(network, ring.patches[k]);
       const BSplineSurface<3> surface = refine(old, u, old.v());
@@ -230,8 +244,10 @@ SurfaceNetwork with_knots_added(const SurfaceNetwork& network, const std::vector
         }
       }
     }
+
     set_rows(finer, ring, u, columns);
   }
+
   finer.control_points_mm =
       Eigen::Map<const Points3>(pool.data()->data(), 3, static_cast<Eigen::Index>(pool.size()));
   return compacted(std::move(finer));

@@ -1,9 +1,9 @@
-// How far each node of a wall must move along its normal to lie on the wall that the image shows.
+// How far each node of a wall must move along its normal to lie on the wall that evidence shows.
 #pragma once
 
 #include <vector>
 
-#include "recovery/wall/wall_greys.h"
+#include "recovery/wall/evidence.h"
 
 namespace angiospline {
 
@@ -11,27 +11,15 @@ struct DisplacementOptions {
   std::vector<double> half_windows_vox{1.5, 0.75};  // of the profile, one for each round
   // Waves that are tried, in multiples of the rule's own.
   std::vector<double> wave_factors{0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
-  double largest_move_radii = 0.5;   // of any node from where the mesh has it
-  const WallGreys* greys = nullptr;  // levels at the nodes, where they are known; else measured
+  double largest_move_radii = 0.5;  // of any node from where the mesh has it
 };
-
-// What the image asks for at each node, along its normal, measured from where displacements have
-// taken it.
-struct WallOffsets {
-  Eigen::VectorXd mm;
-  Eigen::VectorXd weight;  // 0: nothing was measured there
-};
-WallOffsets wall_offsets(const GreyField& field, const FitMesh& mesh, const WallGreys& greys,
-                         const Eigen::VectorXd& displacement_mm, double half_window_vox);
 
 // The answer at each node, and what it rests on.
 struct Displacement {
-  Eigen::VectorXd normal_mm;     // smooth
-  Eigen::VectorXd residual_mm;   // what the image asks for beyond it, at the end
-  Eigen::VectorXd weight;        // 0: nothing was measured there
-  std::vector<double> evidence;  // of each region: grey just inside minus grey just outside, over
-                                 // the contrast of all; near 1 on a wall, near 0 away from any
-  WallGreys greys;
+  Eigen::VectorXd normal_mm;        // smooth
+  Eigen::VectorXd residual_mm;      // what the evidence asks for beyond it, at the end
+  Eigen::VectorXd weight;           // 0: nothing was measured there
+  std::vector<double> evidence;     // of each region: near 1 on a wall, near 0 away from any
   double wave_factor = 1.0;         // the one taken
   double degrees_of_freedom = 0.0;  // of the smooth displacement; 0 where one wave only was tried
 };
@@ -40,8 +28,8 @@ struct Displacement {
 // have come to, always along the normals of the mesh, and fits the total displacement: waves
 // shorter than L = 32 SNR^-0.4 voxels (at most the radii stated, more where the noise is stronger
 // than a quarter) are left out, so that a second round is no rougher than the first. Outliers count
-// less.
-Displacement wall_displacement(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
+// less. Without any evidence nothing moves. Requires a node and a window.
+Displacement wall_displacement(Evidence& evidence, const FitMesh& mesh, MeshSmoother& smoother,
                                const DisplacementOptions& options = {},
                                const Progress& progress = {});
 

@@ -5,15 +5,12 @@
 #include <numbers>
 
 #include "base/contract.h"
+#include "recovery/wall/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kFar = 12.0;        // amplitude over sigma from which the series is exact enough
-constexpr std::size_t kFewest = 50;  // values on either side
-constexpr std::size_t kMostValues = 20000;
-constexpr double kLeastEvidence = 5.0;  // of log likelihood
-constexpr double kLeastGrey = 0.05;     // of sigma: greys are rounded, and levels vary
+using namespace wall_rules;
 
 // exp(-x) I_n(x), n = 0 or 1.
 double scaled_bessel(int n, double x) { return std::exp(-x) * std::cyl_bessel_i(n, x); }
@@ -56,7 +53,7 @@ double log_likelihood(const std::vector<double>& values, const Density& density)
 
 // At most so many values, evenly spread: more say nothing new.
 std::vector<double> thinned(const std::vector<double>& values) {
-  const std::size_t step = 1 + values.size() / kMostValues;
+  const std::size_t step = 1 + values.size() / kMostGreys;
   std::vector<double> some;
   for (std::size_t k = 0; k < values.size(); k += step) some.push_back(values[k]);
   return some;
@@ -85,7 +82,7 @@ double best_between(double low, double high, const Function& value) {
 double rician_mean(double amplitude, double sigma) {
   EXPECTS(amplitude >= 0 && sigma > 0);
   const double a = amplitude / sigma;
-  if (a > kFar) return amplitude + sigma * (1 / (2 * a) + 1 / (8 * a * a * a));
+  if (a > kFarAmplitude) return amplitude + sigma * (1 / (2 * a) + 1 / (8 * a * a * a));
   const double x = a * a / 4;
   return sigma * std::sqrt(std::numbers::pi / 2) *
          ((1 + 2 * x) * scaled_bessel(0, x) + 2 * x * scaled_bessel(1, x));
@@ -93,7 +90,7 @@ double rician_mean(double amplitude, double sigma) {
 
 double rician_deviation(double amplitude, double sigma) {
   const double a = amplitude / sigma;
-  if (a > kFar) return sigma * std::sqrt(1 - 1 / (2 * a * a));
+  if (a > kFarAmplitude) return sigma * std::sqrt(1 - 1 / (2 * a * a));
   const double mean = rician_mean(a, 1);
   return sigma * std::sqrt(a * a + 2 - mean * mean);
 }
@@ -111,7 +108,8 @@ double rician_amplitude(double mean, double sigma) {
 NoiseVerdict noise_of(const std::vector<double>& all_inside,
                       const std::vector<double>& all_outside) {
   NoiseVerdict verdict;
-  if (all_inside.size() < kFewest || all_outside.size() < kFewest) return verdict;
+  if (all_inside.size() < kFewestGreys || all_outside.size() < kFewestGreys) return verdict;
+
   const std::vector<double> inside = thinned(all_inside), outside = thinned(all_outside);
   const Moments in = moments(inside), out = moments(outside);
   const auto n = static_cast<double>(inside.size()), m = static_cast<double>(outside.size());
@@ -122,12 +120,14 @@ NoiseVerdict noise_of(const std::vector<double>& all_inside,
                         *std::min_element(outside.begin(), outside.end()) >= 0;
   if (!positive || !(in.deviation > 0) || !(out.deviation > 0)) return verdict;
 
+  // White, one deviation for both, or one each.
   const auto white = [](const std::vector<double>& values, double mean, double sigma) {
     return log_likelihood(values, [&](double v) { return log_normal_density(v, mean, sigma); });
   };
   const double one = white(inside, in.mean, common) + white(outside, out.mean, common);
   const double each =
       white(inside, in.mean, in.deviation) + white(outside, out.mean, out.deviation);
+
   const auto rician = [&](double sigma) {
     const auto of = [sigma](const std::vector<double>& values, double mean) {
       const double amplitude = rician_amplitude(mean, sigma);
@@ -136,9 +136,11 @@ NoiseVerdict noise_of(const std::vector<double>& all_inside,
     };
     return of(inside, in.mean) + of(outside, out.mean);
   };
+
+  // Rician, one sigma for both: sought about the deviation inside, where noise is nearly white.
   const double sigma = best_between(0.7 * in.deviation, 1.5 * in.deviation, rician);
   verdict.evidence = rician(sigma) - std::max(one, each);
-  if (verdict.evidence >= kLeastEvidence) {
+  if (verdict.evidence >= kLeastLogLikelihood) {
     verdict.kind = NoiseKind::kRician;
     verdict.sigma = sigma;
   }

@@ -11,24 +11,12 @@
 
 #include "base/index.h"
 #include "base/median.h"
+#include "recovery/wall/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kBestSnr = 20.0;        // beyond it other errors than noise count
-constexpr double kNeighbourRise = 0.35;  // of the contrast: grey that is another vessel's
-constexpr double kNoiseRise = 4.0;       // standard deviations of noise that are no vessel
-constexpr double kOutsideWave = 5.0;     // radii over which the background may vary
-constexpr double kInsideMean = 8.0;      // radii over which the inside is averaged
-constexpr int kLevelRounds = 2;          // the second without the first one's outliers
-constexpr double kNodeNoise = 0.65;  // of a voxel's noise left by interpolation across a profile
-constexpr double kOutlier = 3.0;     // standard deviations from which a value counts less
-constexpr double kBend = 0.9;        // of the way to a centre of curvature that counts as inside
-constexpr double kNoiseFrom = 1.6, kNoiseTo = 4.6;  // widths from the wall: voxels that show noise
-constexpr double kNormalScale = 1.4826;    // median absolute deviation to standard deviation
-constexpr std::size_t kFewestInside = 50;  // voxels: fewer say less about noise than the outside
-constexpr double kClearContrast = 0.5;     // of the median: nodes that a mean profile is made of
-constexpr int kSagSteps = 16;              // of the mean profile, even
+using namespace wall_rules;
 
 std::vector<WallSides> all_sides(const GreyField& field, const FitMesh& mesh,
                                  const Eigen::VectorXd& displacement, double gate) {
@@ -106,12 +94,15 @@ void judge_noise(const GreyField& field, const FitMesh& mesh, const Eigen::Vecto
       if (s > kNoiseFrom && s * width > deepest) break;
       inside.add(field, p.point_mm - std::min(s * width, deepest) * p.normal, greys.inside(k));
     }
+    // Outwards until another vessel begins.
     for (double s = kNoiseFrom; s <= kNoiseTo && outer_weight(k) > 0; s += 1) {
       const Vec3 place = p.point_mm + s * width * p.normal;
       if (!field.covers(place) || field.at(place) > greys.outside(k) + gate) break;
       outside.add(field, place, greys.outside(k));
     }
   }
+
+  // Of white noise either side tells the deviation; the inside varies less by itself.
   const Side& better = inside.residuals.size() >= kFewestInside ? inside : outside;
   greys.noise = deviation_of(better.residuals);
   const NoiseVerdict verdict =
@@ -146,8 +137,6 @@ class MagnitudeLevels {
 
   // Place and width of the blurred edge through these distances and means, by Gauss-Newton steps.
   Vec2 edge_through(const Eigen::MatrixX2d& means, double half_window) const {
-    constexpr double kStep = 1e-4, kNarrowest = 0.15;
-    constexpr int kRounds = 12;
     const auto misfit = [&](const Vec2& edge) {
       Eigen::VectorXd off(means.rows());
       for (Eigen::Index j = 0; j < means.rows(); ++j) {
@@ -155,16 +144,19 @@ class MagnitudeLevels {
       }
       return off;
     };
-    Vec2 edge(0.0, 0.4);
-    for (int round = 0; round < kRounds; ++round) {
+
+    Vec2 edge(0.0, kEdgeFit.first_width);
+    for (int round = 0; round < kEdgeFit.rounds; ++round) {
       const Eigen::VectorXd off = misfit(edge);
       Eigen::MatrixX2d J(means.rows(), 2);
-      for (int p = 0; p < 2; ++p) J.col(p) = (misfit(edge + kStep * Vec2::Unit(p)) - off) / kStep;
+      for (int p = 0; p < 2; ++p) {
+        J.col(p) = (misfit(edge + kEdgeFit.difference * Vec2::Unit(p)) - off) / kEdgeFit.difference;
+      }
       const Vec2 step = (J.transpose() * J).ldlt().solve(J.transpose() * off);
       if (!step.allFinite()) break;
-      edge -= step.cwiseMax(-0.3).cwiseMin(0.3);
+      edge -= step.cwiseMax(-kEdgeFit.longest_step).cwiseMin(kEdgeFit.longest_step);
       edge(0) = std::clamp(edge(0), -half_window, half_window);
-      edge(1) = std::clamp(edge(1), kNarrowest, half_window);
+      edge(1) = std::clamp(edge(1), kEdgeFit.narrowest, half_window);
     }
     return edge;
   }
@@ -184,6 +176,8 @@ Eigen::MatrixX2d voxels_across(const GreyField& field, const FitMesh& mesh, cons
     if (mesh.near_rim[index(k)] || contrast < kClearContrast * greys.contrast) continue;
     const WallPoint p = parallel_point(mesh.nodes[index(k)], displacement(k));
     const double width = field.width_mm(p.normal);
+
+    // The voxels that the profile passes; each by where its centre is, not by where it was passed.
     for (int j = 0; j <= kSagSteps; j += 2) {
       const auto v = voxel_at(field, p.point_mm + place_of(j, half_window) * width * p.normal);
       if (!v) continue;
@@ -195,6 +189,8 @@ Eigen::MatrixX2d voxels_across(const GreyField& field, const FitMesh& mesh, cons
       sums.row(row) += Eigen::RowVector3d(s, (grey - greys.outside(k)) / contrast, 1);
     }
   }
+
+  // Classes that no voxel fell into have no row.
   Eigen::MatrixX2d means(0, 2);
   for (Eigen::Index row = 0; row < sums.rows(); ++row) {
     if (sums(row, 2) == 0) continue;
@@ -231,16 +227,22 @@ double WallGreys::noise_density(const GreyField& field, double half_window_vox,
   return 2 * half_window_vox * voxel * voxel * area / (snr() * snr());
 }
 
-WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
-                     const Eigen::VectorXd& displacement) {
-  const Eigen::Index n = mesh.size();
+namespace {
+
+// Levels of the whole wall, and by how much grey may rise outside before it is another vessel's.
+struct GlobalLevels {
+  double inside, outside, gate;
+};
+GlobalLevels global_levels(const GreyField& field, const FitMesh& mesh,
+                           const Eigen::VectorXd& displacement) {
   std::vector<double> in, out;
-  std::vector<WallSides> sides =
+  const std::vector<WallSides> sides =
       all_sides(field, mesh, displacement, std::numeric_limits<double>::infinity());
   for (const WallSides& s : sides) {
     if (s.inside_weight > 0) in.push_back(s.inside);
     if (s.outside_weight > 0) out.push_back(s.outside);
   }
+
   if (in.empty()) {  // nothing but thin vessels: their middles, of which the brighter half is purer
     for (const WallPoint& node : mesh.nodes) {
       if (node.largest_curvature > 0) {
@@ -248,12 +250,23 @@ WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& 
       }
     }
   }
+
   const double inside = median(in);
   const double outside = median(out);
   const double noise = noise_beyond(field, mesh, displacement, outside);
-  const double gate = std::max(kNeighbourRise * std::abs(inside - outside), kNoiseRise * noise);
-  sides = all_sides(field, mesh, displacement, gate);
+  return {inside, outside,
+          std::max(kNeighbourRise * std::abs(inside - outside), kNoiseRise * noise)};
+}
 
+}  // namespace
+
+WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& smoother,
+                     const Eigen::VectorXd& displacement) {
+  const Eigen::Index n = mesh.size();
+  const auto [inside, outside, gate] = global_levels(field, mesh, displacement);
+  const std::vector<WallSides> sides = all_sides(field, mesh, displacement, gate);
+
+  // Deviations from the global levels at each node.
   Eigen::VectorXd inner(n), outer(n), inner_weight(n), outer_weight(n), waves(n);
   for (Eigen::Index k = 0; k < n; ++k) {
     const WallSides& s = sides[index(k)];
@@ -263,6 +276,8 @@ WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& 
     outer_weight(k) = mesh.near_rim[index(k)] ? 0.0 : s.outside_weight;
     waves(k) = kOutsideWave * mesh.radii_mm[index(k)];
   }
+
+  // Smoothed over the wall, a second time without what stands out of the first.
   const double radius = median(mesh.radii_mm);
   WallGreys greys;
   Eigen::VectorXd w_in = inner_weight, w_out = outer_weight;
@@ -272,11 +287,11 @@ WallGreys wall_greys(const GreyField& field, const FitMesh& mesh, MeshSmoother& 
     weigh_outliers(inner - greys.inside, inner_weight, 0.0, w_in);
     weigh_outliers(outer - greys.outside, outer_weight, 0.0, w_out);
   }
+
   greys.inside.array() += inside;
   greys.outside.array() += outside;
   const Eigen::VectorXd contrast = greys.inside - greys.outside;
   greys.contrast = median({contrast.data(), contrast.data() + n});
-
   judge_noise(field, mesh, displacement, inner_weight, outer_weight, gate, greys);
   return greys;
 }

@@ -12,12 +12,12 @@
 #include "base/random.h"
 #include "kernel/evaluate/curvature.h"
 #include "kernel/geometry/point_index.h"
+#include "recovery/wall/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kLeastCotangent = 0.02;  // keeps the stiffness of slivers positive
-constexpr double kFloor = 1e-9;           // of weights: a component without any stays solvable
+using namespace wall_rules;
 
 // The wall's part of a tessellation: triangles of regions, and the points they use.
 struct WallPart {
@@ -46,6 +46,7 @@ WallPart wall_of(const Tessellation& mesh, int regions, std::vector<int>& region
     }
     kept.push_back(triangle);
   }
+
   wall.triangles.resize(3, static_cast<Eigen::Index>(kept.size()));
   for (std::size_t t = 0; t < kept.size(); ++t) {
     wall.triangles.col(static_cast<Eigen::Index>(t)) = kept[t];
@@ -62,6 +63,7 @@ std::vector<char> nodes_near_rims(const SurfaceNetwork& network, const FitMesh& 
   for (std::size_t r = 0; r < network.rims.size(); ++r) {
     centers.col(static_cast<Eigen::Index>(r)) = network.rims[r].center_mm;
   }
+
   const PointIndex rim_centers(centers);
   for (std::size_t k = 0; k < near.size(); ++k) {
     const Rim& rim = network.rims[index(rim_centers.nearest(mesh.nodes[k].point_mm).point)];
@@ -81,8 +83,8 @@ Result<FitMesh> make_fit_mesh(const SurfaceNetwork& network, const FitMeshOption
   double largest = 0;
   for (const Region& region : network.regions) largest = std::max(largest, region.radius_mm);
   if (largest > 0) {
-    spacing.longest_edge =
-        std::clamp(options.longest_edge_vox * options.voxel_mm / largest, 0.15, 0.4);
+    spacing.longest_edge = std::clamp(options.longest_edge_vox * options.voxel_mm / largest,
+                                      kShortestEdge, kLongestEdge);
   }
   const auto tessellation = tessellate(network, spacing, progress);
   if (!tessellation) return fail(tessellation.error());
@@ -96,6 +98,8 @@ FitMesh fit_mesh_of(const SurfaceNetwork& network, const Tessellation& tessellat
       wall_of(tessellation, static_cast<int>(network.regions.size()), mesh.regions);
   mesh.points = wall.points;
   mesh.triangles = wall.triangles;
+
+  // Normals and curvatures of the surface itself, not of the triangles.
   std::vector<BSplineSurface<3>> surfaces;
   for (std::size_t p = 0; p < network.patches.size(); ++p) {
     surfaces.push_back(patch_surface(network, static_cast<int>(p)));
@@ -113,11 +117,14 @@ FitMesh fit_mesh_of(const SurfaceNetwork& network, const Tessellation& tessellat
     mesh.nodes.push_back(node);
     mesh.origins.push_back(origin);
   }
+
+  // A radius is that of the larger curvature, near to what the region says.
   for (std::size_t k = 0; k < mesh.nodes.size(); ++k) {
     const double known = network.regions[index(mesh.regions[k])].radius_mm;
     const double bent = mesh.nodes[k].largest_curvature;
     const double from_surface = bent > 0 ? 1 / bent : std::numeric_limits<double>::infinity();
-    mesh.radii_mm.push_back(known > 0 ? std::clamp(from_surface, known, 3 * known) : from_surface);
+    mesh.radii_mm.push_back(known > 0 ? std::clamp(from_surface, known, kLargestRadius * known)
+                                      : from_surface);
   }
   mesh.near_rim = nodes_near_rims(network, mesh, options.rim_margin_vox * options.voxel_mm);
   return mesh;
@@ -128,6 +135,8 @@ Points3 moved_normals(const FitMesh& mesh, const Eigen::VectorXd& displacement) 
   const auto moved = [&](int k) -> Vec3 {
     return mesh.nodes[index(k)].point_mm + displacement(k) * mesh.nodes[index(k)].normal;
   };
+
+  // Normals of the nodes by the triangles around them, weighted by area, before and after.
   Points3 before = turned;
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
     const Eigen::Vector3i c = mesh.triangles.col(t);
@@ -141,6 +150,7 @@ Points3 moved_normals(const FitMesh& mesh, const Eigen::VectorXd& displacement) 
       turned.col(k) += normal;
     }
   }
+
   for (int k = 0; k < mesh.size(); ++k) {
     turned.col(k) =
         (mesh.nodes[index(k)].normal + turned.col(k).normalized() - before.col(k).normalized())
@@ -165,6 +175,9 @@ const FrontalFactor& factored(std::optional<FrontalFactor>& known,
 MeshSmoother::MeshSmoother(const FitMesh& mesh) {
   const int n = mesh.size();
   mass_ = Eigen::VectorXd::Zero(n);
+
+  // The cotangent Laplacian (Pinkall & Polthier: Computing discrete minimal surfaces and their
+  // conjugates, Experimental Mathematics 2, 1993); a third of each triangle for its corners.
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(index(mesh.triangles.cols()) * 12);
   for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
@@ -184,8 +197,9 @@ MeshSmoother::MeshSmoother(const FitMesh& mesh) {
       entries.emplace_back(b, a, -half);
     }
   }
+
   const double mean_mass = mass_.sum() / std::max(1, n);
-  mass_ = mass_.cwiseMax(1e-3 * mean_mass);  // a node of slivers alone still has a say
+  mass_ = mass_.cwiseMax(kLeastMass * mean_mass);
   stiffness_.resize(n, n);
   stiffness_.setFromTriplets(entries.begin(), entries.end());
 }
@@ -193,7 +207,7 @@ MeshSmoother::MeshSmoother(const FitMesh& mesh) {
 Eigen::VectorXd MeshSmoother::mean(const Eigen::VectorXd& values, const Eigen::VectorXd& weights,
                                    double length_mm) {
   Matrix A = length_mm * length_mm * stiffness_;
-  A.diagonal() += weights.cwiseMax(kFloor).cwiseProduct(mass_);
+  A.diagonal() += weights.cwiseMax(kLeastWeight).cwiseProduct(mass_);
   return factored(mean_factor_, A).solve(weights.cwiseProduct(mass_).cwiseProduct(values));
 }
 
@@ -204,20 +218,19 @@ Eigen::VectorXd MeshSmoother::fair(const Eigen::VectorXd& values, const Eigen::V
   const Matrix scaled = strength.asDiagonal() * stiffness_;
   Matrix A = stiffness_ * scaled;
   weighted_mass_ = weights.cwiseProduct(mass_);
-  A.diagonal() += weights.cwiseMax(kFloor).cwiseProduct(mass_);
+  A.diagonal() += weights.cwiseMax(kLeastWeight).cwiseProduct(mass_);
   return factored(fair_factor_, A).solve(weighted_mass_.cwiseProduct(values));
 }
 
 double MeshSmoother::degrees_of_freedom() const {
-  constexpr int kProbes = 6;
   Random random(2026);
   double sum = 0;
-  for (int probe = 0; probe < kProbes; ++probe) {
+  for (int probe = 0; probe < kTraceProbes; ++probe) {
     Eigen::VectorXd signs(mass_.size());
     for (double& s : signs) s = random.bits() % 2 == 0 ? 1.0 : -1.0;
     sum += signs.dot(fair_factor_->solve(weighted_mass_.cwiseProduct(signs)));
   }
-  return sum / kProbes;
+  return sum / kTraceProbes;
 }
 
 }  // namespace angiospline

@@ -6,6 +6,7 @@
 #include "kernel/geometry/point_index.h"
 
 namespace angiospline {
+
 Points3 node_points(const FitMesh& mesh) {
   Points3 points(3, mesh.size());
   for (int k = 0; k < mesh.size(); ++k) points.col(k) = mesh.nodes[index(k)].point_mm;
@@ -26,12 +27,15 @@ FitMeshPart part_near(const FitMesh& whole, const Points3& places, double reach)
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t k) {
     near[k] = places_index.nearest(whole.nodes[k].point_mm).distance <= reach;
   });
+
+  // Triangles whose corners are all near; nodes in the order in which these come to them.
   FitMeshPart part;
   std::vector<int> node_of(near.size(), -1);
   std::vector<Eigen::Vector3i> kept;
   for (Eigen::Index t = 0; t < whole.triangles.cols(); ++t) {
     Eigen::Vector3i triangle = whole.triangles.col(t);
-    if (!near[index(triangle(0))] || !near[index(triangle(1))] || !near[index(triangle(2))]) continue;
+    if (!near[index(triangle(0))] || !near[index(triangle(1))] || !near[index(triangle(2))])
+      continue;
     for (int& k : triangle) {
       int& node = node_of[index(k)];
       if (node < 0) {
@@ -48,6 +52,7 @@ FitMeshPart part_near(const FitMesh& whole, const Points3& places, double reach)
     }
     kept.push_back(triangle);
   }
+
   part.mesh.triangles.resize(3, static_cast<Eigen::Index>(kept.size()));
   for (std::size_t t = 0; t < kept.size(); ++t) {
     part.mesh.triangles.col(static_cast<Eigen::Index>(t)) = kept[t];

@@ -5,19 +5,16 @@
 #include <cmath>
 
 #include "base/contract.h"
+#include "base/index.h"
+#include "recovery/wall/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kSteps = 16;          // of a profile, even
-constexpr double kBend = 0.9;       // a window reaches at most this part of the way to a centre
-constexpr double kGate = 0.25;      // of the contrast: a rise that is no noise
-constexpr double kGateNoise = 4.0;  // standard deviations that are noise
-constexpr double kSideFrom = 1.6;   // widths of a voxel from the wall: beyond its blur
-constexpr double kSideTo = 3.6;
-constexpr double kSideStep = 0.5;
+using namespace wall_rules;
 
-// Weights of the four voxels around a place t in [0, 1] between the middle two.
+// Weights of the four voxels around a place t in [0, 1] between the middle two (Keys: Cubic
+// convolution interpolation for digital image processing, IEEE Trans. ASSP 29, 1981; a = -1/2).
 std::array<double, 4> cubic_weights(double t) {
   const double u = 1 - t;
   return {-0.5 * t * u * u, 1 + t * t * (1.5 * t - 2.5), 1 + u * u * (1.5 * u - 2.5),
@@ -33,17 +30,16 @@ struct Growth {
   double integral(double s) const { return s * (1 + s * (twice_mean / 2 + s * gauss / 3)); }
 };
 
-using Profile = std::array<double, kSteps + 1>;
+using Profile = std::array<double, kProfileSteps + 1>;
 
 // Holds the profile beyond the place where it turns by more than `turn`, going from the middle to
 // the end; `sign` 1 for a rise, -1 for a fall.
 void hold_beyond_turn(Profile& f, int middle, int step, double sign, double turn) {
-  double least = sign * f[static_cast<std::size_t>(middle)];
-  for (int k = middle; k >= 0 && k <= kSteps; k += step) {
-    double& value = f[static_cast<std::size_t>(k)];
+  double least = sign * f[index(middle)];
+  for (int k = middle; k >= 0 && k <= kProfileSteps; k += step) {
+    double& value = f[index(k)];
     if (sign * value > least + turn) {
-      for (int j = k; j >= 0 && j <= kSteps; j += step)
-        f[static_cast<std::size_t>(j)] = sign * least;
+      for (int j = k; j >= 0 && j <= kProfileSteps; j += step) f[index(j)] = sign * least;
       return;
     }
     least = std::min(least, sign * value);
@@ -62,7 +58,7 @@ GreyField::GreyField(const Image<float>& image)
 bool GreyField::covers(const Vec3& p) const {
   const Vec3 x = to_index_ * p - shift_;
   for (int i = 0; i < 3; ++i) {
-    const double last = image_.grid.size[static_cast<std::size_t>(i)] - 1;
+    const double last = image_.grid.size[index(i)] - 1;
     if (!(x(i) >= -0.5 && x(i) <= last + 0.5)) return false;
   }
   return true;
@@ -79,10 +75,12 @@ double GreyField::at(const Vec3& p) const {
     const int low = std::min(static_cast<int>(c), last - 1);
     weights[i] = cubic_weights(c - low);
     for (int k = 0; k < 4; ++k) {
-      offsets[i][static_cast<std::size_t>(k)] = std::clamp(low - 1 + k, 0, last) * stride;
+      offsets[i][index(k)] = std::clamp(low - 1 + k, 0, last) * stride;
     }
     stride *= image_.grid.size[i];
   }
+
+  // Separable: lines, then slices.
   const float* voxels = image_.voxels.data();
   double sum = 0;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -105,7 +103,6 @@ double GreyField::width_mm(const Vec3& n) const {
 }
 
 WallPoint parallel_point(const WallPoint& at, double offset) {
-  constexpr double kLeastGrowth = 0.2;
   WallPoint p = at;
   p.point_mm += offset * at.normal;
   const auto parallel = [&](double curvature) {
@@ -120,6 +117,8 @@ WallOffset wall_offset(const GreyField& field, const WallPoint& at, const WallLe
                        const ProfileOptions& options) {
   WallOffset result;
   const double contrast = levels.contrast();
+
+  // The window, shortened on the side of a centre of curvature.
   const double half = options.half_window_vox * field.width_mm(at.normal);
   double in = half, out = half;
   if (at.largest_curvature * half > kBend) in = kBend / at.largest_curvature;
@@ -129,24 +128,28 @@ WallOffset wall_offset(const GreyField& field, const WallPoint& at, const WallLe
       !field.covers(at.point_mm + out * at.normal)) {
     return result;
   }
-  const double step = (in + out) / kSteps;
+
+  // Grey from level to level, held where another vessel or a hole begins.
+  const double step = (in + out) / kProfileSteps;
   Profile f;
-  for (int k = 0; k <= kSteps; ++k) {
+  for (int k = 0; k <= kProfileSteps; ++k) {
     const double grey = field.at(at.point_mm + (k * step - in) * at.normal);
-    f[static_cast<std::size_t>(k)] = (grey - levels.outside) / contrast;
+    f[index(k)] = (grey - levels.outside) / contrast;
   }
-  const double turn = std::max(kGate, kGateNoise * options.noise / std::abs(contrast));
-  const int middle = std::clamp(static_cast<int>(std::lround(in / step)), 0, kSteps);
+  const double turn = std::max(kTurn, kTurnNoise * options.noise / std::abs(contrast));
+  const int middle = std::clamp(static_cast<int>(std::lround(in / step)), 0, kProfileSteps);
   hold_beyond_turn(f, middle, 1, 1.0, turn);
   hold_beyond_turn(f, middle, -1, -1.0, turn);
 
+  // int f w ds by Simpson's rule.
   const Growth growth{at.largest_curvature + at.smallest_curvature,
                       at.largest_curvature * at.smallest_curvature};
   double sum = 0;
-  for (int k = 0; k <= kSteps; ++k) {
-    const double simpson = k == 0 || k == kSteps ? 1.0 : k % 2 == 1 ? 4.0 : 2.0;
-    sum += simpson * f[static_cast<std::size_t>(k)] * growth.at(k * step - in);
+  for (int k = 0; k <= kProfileSteps; ++k) {
+    const double simpson = k == 0 || k == kProfileSteps ? 1.0 : k % 2 == 1 ? 4.0 : 2.0;
+    sum += simpson * f[index(k)] * growth.at(k * step - in);
   }
+
   // To first order d is the sum itself: solved exactly it would turn noise into a bias of H times
   // the noise's variance, and where the wall is found it is zero either way.
   const double wanted = sum * step / 3 + growth.integral(-in);
@@ -168,11 +171,13 @@ WallSides wall_sides(const GreyField& field, const WallPoint& at, double gate) {
     const Vec3 inner = at.point_mm - s * at.normal;
     if (s <= center && field.covers(inner)) {
       // Rings nearer to the axis hold less of the vessel.
-      const double weight = std::max(0.1, 1 - s * at.largest_curvature);
+      const double weight = std::max(kLeastRingWeight, 1 - s * at.largest_curvature);
       sides.inside += weight * field.at(inner);
       sides.inside_weight += weight;
     }
   }
+
+  // Outwards until another vessel begins: what rises above the least grey on the way.
   for (double s = from; s <= kSideTo * width; s += kSideStep * width) {
     const Vec3 outer = at.point_mm + s * at.normal;
     if (!field.covers(outer)) break;
@@ -182,6 +187,7 @@ WallSides wall_sides(const GreyField& field, const WallPoint& at, double gate) {
     sides.outside += grey;
     sides.outside_weight += 1;
   }
+
   if (sides.inside_weight > 0) sides.inside /= sides.inside_weight;
   if (sides.outside_weight > 0) sides.outside /= sides.outside_weight;
   return sides;
