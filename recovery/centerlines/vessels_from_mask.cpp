@@ -4,11 +4,15 @@
 
 #include <fmt/format.h>
 
+#include "base/index.h"
+#include "recovery/centerlines/rules.h"
 #include "recovery/imaging/skeleton/contacts.h"
 #include "recovery/imaging/skeleton/junction_merging.h"
 
 namespace angiospline {
 namespace {
+
+using namespace centerline_rules;
 
 int nearest_node(const VesselGraph& graph, const Vec3& point_mm) {
   const auto nearest = std::min_element(
@@ -28,23 +32,22 @@ Result<PrunedSkeleton> pruned_axis(const Mask& mask, const VesselsOptions& optio
                  {},
                  "both must lie on one grid"});
   }
+
   Result<Mask> axis = options.skeleton ? *options.skeleton : thin(mask, options.thinning, progress);
   if (!axis) return fail(axis.error());
   const Connectivity connectivity = options.thinning.connectivity;
+
   if (options.keep_twigs) {
     PrunedSkeleton whole;
     whole.graph = vessel_graph(label_skeleton(*axis, connectivity));
     whole.skeleton = std::move(*axis);
     return whole;
   }
+
   PruningOptions pruning = options.pruning;
   pruning.connectivity = connectivity;
   return prune_twigs(mask, std::move(*axis), pruning, progress);
 }
-
-}  // namespace
-
-namespace {
 
 // What was found to touch, in words.
 std::string contact_text(const MaskContact& contact) {
@@ -63,10 +66,9 @@ struct Parted {
 
 Result<Parted> parted(const Mask& mask, VesselsOptions options, std::vector<MaskContact> contacts,
                       const Progress& progress) {
-  constexpr int kRounds = 4;
   options.skeleton.reset();
   Parted out{mask, {}, 0};
-  for (int k = 0; k < kRounds && !contacts.empty(); ++k) {
+  for (int k = 0; k < kPartings && !contacts.empty(); ++k) {
     out.cut += static_cast<int>(contacts.size());
     out.mask = cut_contacts(std::move(out.mask), contacts);
     Result<PrunedSkeleton> axis = pruned_axis(out.mask, options, progress);
@@ -77,26 +79,67 @@ Result<Parted> parted(const Mask& mask, VesselsOptions options, std::vector<Mask
   return out;
 }
 
+// The first root in a component rules: given ones come first, then the thickest ends.
+std::vector<int> roots_of(const VesselGraph& graph, const Mask& mask,
+                          const std::vector<Vec3>& given_mm) {
+  std::vector<int> roots;
+  for (const Vec3& root : given_mm) roots.push_back(nearest_node(graph, root));
+  for (const int n : thickest_ends(graph, mask)) roots.push_back(n);
+  return roots;
+}
+
+// Masks without a vessel, or without a background.
+std::optional<Error> find_defect(const Mask& mask, const TopologyNumbers& numbers) {
+  if (numbers.components == 0) {
+    return Error{
+        ErrorKind::kBadInput, "mask is empty", {}, {}, "at least one voxel must be foreground"};
+  }
+  if (std::find(mask.voxels.begin(), mask.voxels.end(), 0) == mask.voxels.end()) {
+    return Error{ErrorKind::kBadInput,
+                 "mask is full",
+                 {},
+                 "no voxel is background",
+                 "a vessel has a wall within the image"};
+  }
+  return std::nullopt;
+}
+
+// Says in the tree what was taken for granted on the way to it.
+void name_assumptions(Vessels& vessels, bool roots_given) {
+  CenterlineTree& tree = vessels.tree;
+  for (const int inlet : tree.inlets) {
+    tree.assumptions.push_back(fmt::format("inlet {}: {}", tree.nodes[index(inlet)].name,
+                                           roots_given
+                                               ? "nearest to a given root, or else the thickest end"
+                                               : "the thickest end, since no root was given"));
+  }
+
+  for (const MaskContact& contact : vessels.contacts) {
+    tree.assumptions.push_back(contact_text(contact) +
+                               (vessels.contacts_cut > 0 ? "; cut" : "; taken as joined"));
+  }
+
+  if (vessels.hidden_cycles > 0) {
+    tree.assumptions.push_back(
+        fmt::format("{} tunnels of the mask are no wider than a junction and no loops of the tree",
+                    vessels.hidden_cycles));
+  }
+}
+
 }  // namespace
 
 Result<Vessels> vessels_from_mask(const Mask& given, const VesselsOptions& options,
                                   const Progress& progress) {
   Vessels vessels;
-  Mask cut_mask;
   const Connectivity connectivity = options.thinning.connectivity;
   vessels.before = topology_numbers(given, connectivity);
-  if (vessels.before.components == 0)
-    return fail(
-        {ErrorKind::kBadInput, "mask is empty", {}, {}, "at least one voxel must be foreground"});
-  if (std::find(given.voxels.begin(), given.voxels.end(), 0) == given.voxels.end())
-    return fail({ErrorKind::kBadInput,
-                 "mask is full",
-                 {},
-                 "no voxel is background",
-                 "a vessel has a wall within the image"});
+  if (const auto defect = find_defect(given, vessels.before)) return fail(*defect);
+
+  // The axis, and the mask that it belongs to: contacts are cut in the mask, not in the axis.
   Result<PrunedSkeleton> pruned = pruned_axis(given, options, progress);
   if (!pruned) return fail(pruned.error());
   vessels.contacts = find_contacts(pruned->graph, given);
+  Mask cut_mask;
   if (options.cut_contacts && !vessels.contacts.empty()) {
     Result<Parted> apart = parted(given, options, vessels.contacts, progress);
     if (!apart) return fail(apart.error());
@@ -108,30 +151,18 @@ Result<Vessels> vessels_from_mask(const Mask& given, const VesselsOptions& optio
   vessels.skeleton = std::move(pruned->skeleton);
   vessels.twigs = pruned->twigs;
   vessels.after = topology_numbers(vessels.skeleton, connectivity);
+
+  // The graph, rooted where flow enters.
   const VesselGraph graph = merge_close_junctions(pruned->graph, mask, options.merge_radii);
   vessels.merged = static_cast<int>(pruned->graph.nodes.size() - graph.nodes.size());
   for (const VesselNode& node : graph.nodes) vessels.hidden_cycles += node.cluster_cycles;
-  std::vector<int> roots;
-  for (const Vec3& root : options.roots_mm) roots.push_back(nearest_node(graph, root));
-  const std::size_t given_roots = roots.size();
-  for (const int n : thickest_ends(graph, mask)) roots.push_back(n);
-  vessels.graph = rooted_at(graph, roots);  // the first root in a component rules: the given one
+  vessels.graph = rooted_at(graph, roots_of(graph, mask, options.roots_mm));
+
   Result<CenterlineTree> tree =
       centerlines_from_graph(vessels.graph, mask, options.centerlines, progress);
   if (!tree) return fail(tree.error());
   vessels.tree = std::move(*tree);
-  for (const int inlet : vessels.tree.inlets)
-    vessels.tree.assumptions.push_back(
-        fmt::format("inlet {}: {}", vessels.tree.nodes[static_cast<std::size_t>(inlet)].name,
-                    given_roots > 0 ? "nearest to a given root, or else the thickest end"
-                                    : "the thickest end, since no root was given"));
-  for (const MaskContact& contact : vessels.contacts)
-    vessels.tree.assumptions.push_back(contact_text(contact) +
-                                       (vessels.contacts_cut > 0 ? "; cut" : "; taken as joined"));
-  if (vessels.hidden_cycles > 0)
-    vessels.tree.assumptions.push_back(
-        fmt::format("{} tunnels of the mask are no wider than a junction and no loops of the tree",
-                    vessels.hidden_cycles));
+  name_assumptions(vessels, !options.roots_mm.empty());
   return vessels;
 }
 
