@@ -4,20 +4,14 @@
 #include <cmath>
 #include <optional>
 
+#include "base/index.h"
 #include "kernel/fit/penalised_spline.h"
+#include "recovery/capture/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kDegree = 5;
-constexpr int kOrder = 3;              // of the penalised derivative
-constexpr int kFewestSections = 8;     // measured ones of a branch
-constexpr double kSpanRadii = 0.5;     // knots need not lie closer
-constexpr double kLeastNoise = 1e-3;   // in radii: far below any voxel, above rounding
-constexpr double kPriorDecades = 1.0;  // by which a branch's strength differs from its tree's
-// Strengths in units of (radius)^6 / spacing, as powers of ten.
-constexpr double kFirst = -6.0, kStep = 0.5;
-constexpr int kCount = 31;
+using namespace capture_rules;
 
 class Axis {
  public:
@@ -26,8 +20,8 @@ class Axis {
         (sections.along_mm(sections.along_mm.size() - 1) - sections.along_mm(0)) /
         static_cast<double>(sections.along_mm.size() - 1);
     unit_ = std::pow(sections.radius_mm, 6) / spacing;
-    criteria_.resize(kCount);
-    for (int k = 0; k < kCount; ++k) {
+    criteria_.resize(kStrengths);
+    for (int k = 0; k < kStrengths; ++k) {
       criteria_(k) = spline_.criterion(strength(k), kLeastNoise * sections.radius_mm);
     }
   }
@@ -36,8 +30,8 @@ class Axis {
 
   Points3 smoothed(Eigen::Index of_tree) const {
     Eigen::VectorXd drawn = criteria_;
-    for (Eigen::Index k = 0; k < kCount; ++k) {
-      const double off = static_cast<double>(k - of_tree) * kStep / kPriorDecades;
+    for (Eigen::Index k = 0; k < kStrengths; ++k) {
+      const double off = static_cast<double>(k - of_tree) * kStrengthStep / kPriorDecades;
       drawn(k) += off * off;
     }
     Eigen::Index best = 0;
@@ -55,13 +49,15 @@ class Axis {
     for (int k = 0; k <= spans; ++k) breaks.push_back(first + length * k / spans);
     Eigen::VectorXd weights(n);
     for (Eigen::Index k = 0; k < n; ++k) {
-      weights(k) = s.measured[static_cast<std::size_t>(k)] ? 1.0 : 0.0;
+      weights(k) = s.measured[index(k)] ? 1.0 : 0.0;
     }
-    return PenalisedSpline(KnotVector::clamped(kDegree, breaks), s.along_mm,
-                           s.centers_mm.transpose(), weights, kOrder);
+    return PenalisedSpline(KnotVector::clamped(kAxisDegree, breaks), s.along_mm,
+                           s.centers_mm.transpose(), weights, kPenalisedOrder);
   }
 
-  double strength(int k) const { return unit_ * std::pow(10.0, kFirst + kStep * k); }
+  double strength(int k) const {
+    return unit_ * std::pow(10.0, kFirstStrength + kStrengthStep * k);
+  }
 
   PenalisedSpline spline_;
   double unit_ = 1.0;
@@ -72,15 +68,18 @@ class Axis {
 
 std::vector<Points3> smooth_axes(const std::vector<AxisSections>& branches) {
   std::vector<std::optional<Axis>> axes(branches.size());
-  Eigen::VectorXd all = Eigen::VectorXd::Zero(kCount);
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(kStrengths);
   for (std::size_t b = 0; b < branches.size(); ++b) {
     const auto& measured = branches[b].measured;
     if (std::count(measured.begin(), measured.end(), char{1}) < kFewestSections) continue;
     axes[b].emplace(branches[b]);
     all += axes[b]->criteria();
   }
+
+  // The strength that explains all branches together best; each branch's own is drawn to it.
   Eigen::Index of_tree = 0;
   all.minCoeff(&of_tree);
+
   std::vector<Points3> smooth;
   for (std::size_t b = 0; b < branches.size(); ++b) {
     smooth.push_back(axes[b] ? axes[b]->smoothed(of_tree) : branches[b].centers_mm);

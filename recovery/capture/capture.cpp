@@ -1,9 +1,7 @@
 #include "recovery/capture/capture.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include <Eigen/Geometry>
@@ -14,26 +12,14 @@
 #include "modeling/tree/smooth_centerlines.h"
 #include "recovery/capture/axes.h"
 #include "recovery/capture/greys.h"
+#include "recovery/capture/levels.h"
+#include "recovery/capture/rules.h"
 #include "recovery/capture/stations.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kFewestAngles = 16;      // of a section whose wall is measured
-constexpr double kInsideRadii = 12.0;  // along a branch over which its levels are averaged
-constexpr double kOutsideRadii = 6.0;  // the background may rise
-constexpr double kGoodEvidence = 0.6;  // of the contrast: the sections lie on the vessel
-constexpr double kNoEvidence = 0.3;    // there is none
-constexpr std::array<double, 5> kReaches{1.0, 1.5, 2.2, 3.3, 5.0};
-constexpr double kEnoughContrast = 0.85;  // of the largest at any reach
-constexpr double kLeastContrast = 0.3;    // of the noise around: less is no contrast
-constexpr double kNormalScale = 1.4826;   // median absolute deviation to standard deviation
-constexpr int kFewestClear = 3;  // stations of a branch that are measured, if need be near others
-constexpr int kWideRounds = 6;
-// Voxels on either side of the wall, in each narrow round.
-constexpr std::array<double, 6> kWindows{2.0, 1.5, 1.0, 0.75, .5, .5};
-constexpr int kNarrowRounds = static_cast<int>(kWindows.size());
-constexpr double kRimVox = 1.5;  // of an end that is not looked at
+using namespace capture_rules;
 
 struct Section {
   Vec3 shift = Vec3::Zero();
@@ -53,8 +39,10 @@ class Capture {
 
   Result<CapturedTree> run() {
     CapturedTree result;
-    for (std::size_t b = 0; b < branches_.size(); ++b) measure_levels(branches_[b]);
+    for (std::size_t b = 0; b < branches_.size(); ++b) measure_levels(field_, branches_[b]);
     share_levels();
+
+    // From far off first, then by the wall itself in windows that become narrower.
     const std::vector<std::size_t> led = lead_to_vessels();
     for (const std::size_t b : led) result.recaptured.push_back(tree_.branches[b].name);
     for (int round = 0; round < kNarrowRounds; ++round) {
@@ -65,6 +53,8 @@ class Capture {
                         [&](std::size_t b) { narrow_round(branches_[b], round, last); });
     }
     straighten();
+
+    // Branches that no wall was found for are as they were.
     for (std::size_t b = 0; b < branches_.size(); ++b) {
       if (branches_[b].evidence >= kNoEvidence) continue;
       result.left_alone.push_back(tree_.branches[b].name);
@@ -73,6 +63,7 @@ class Capture {
         s.radius = s.start_radius;
       }
     }
+
     result.tree = moved_tree(tree_, branches_, at_node_, result.mean_move_mm);
     result.rounds = kNarrowRounds + (result.recaptured.empty() ? 0 : kWideRounds);
     return result;
@@ -85,7 +76,7 @@ class Capture {
   void find_clear() {
     for (std::size_t b = 0; b < branches_.size(); ++b) {
       std::ptrdiff_t clear = 0;
-      for (const double share : {1.0, 0.7, 0.5, 0.35}) {
+      for (const double share : kClearShares) {
         std::vector<CaptureStation>& stations = branches_[b].stations;
         for (CaptureStation& s : stations) s.clear = is_clear(s, static_cast<int>(b), share);
         clear = std::count_if(stations.begin(), stations.end(),
@@ -105,9 +96,10 @@ class Capture {
         if ((s.start - node).norm() < kRimVox * voxel_) return false;
         continue;
       }
+
       if (away < share * s.radius) return false;
       for (const int other : at_node_[index(n)]) {
-        if (other == branch || away > 8 * s.radius) continue;
+        if (other == branch || away > kNearJunction * s.radius) continue;
         for (const CaptureStation& o : branches_[index(other)].stations) {
           if ((s.center - o.center).norm() < share * (s.radius + o.radius) + voxel_) return false;
         }
@@ -116,121 +108,26 @@ class Capture {
     return true;
   }
 
-  // Levels at each station, averaged along the branch; contrast is what the tree has together.
-  void measure_levels(CaptureBranch& branch) const {
-    const std::size_t n = branch.stations.size();
-    std::vector<double> in(n), out(n);
-    for (std::size_t k = 0; k < n; ++k) {
-      in[k] = inside_of(field_, branch.stations[k]);
-      out[k] = outside_of(field_, branch.stations[k]);
-    }
-    branch.levels.assign(n, {});
-    const double spacing =
-        (branch.stations.back().along - branch.stations.front().along) / static_cast<double>(n - 1);
-    const double radius = branch.stations[n / 2].radius;
-    const auto within = [&](double radii) {
-      return static_cast<std::size_t>(std::ceil(radii * radius / spacing));
-    };
-    const std::size_t reach_in = within(kInsideRadii), reach_out = within(kOutsideRadii);
-    for (std::size_t k = 0; k < n; ++k) {
-      branch.levels[k].inside = mean_around(branch, in, k, reach_in);
-      branch.levels[k].outside = mean_around(branch, out, k, reach_out);
-    }
-  }
-
-  // Over the measured stations within `reach` of station k, and itself.
-  static double mean_around(const CaptureBranch& branch, const std::vector<double>& values,
-                            std::size_t k, std::size_t reach) {
-    double sum = 0, count = 0;
-    for (std::size_t j = k > reach ? k - reach : 0; j <= std::min(values.size() - 1, k + reach);
-         ++j) {
-      if ((!branch.stations[j].clear && j != k) || !std::isfinite(values[j])) continue;
-      sum += values[j];
-      count += 1;
-    }
-    return sum / count;
-  }
-
-  // Deviation of the greys around the stations from their medians: noise, and what else is there.
-  double noise_around() const {
-    std::vector<double> deviations;
-    for (const CaptureBranch& branch : branches_) {
-      for (const CaptureStation& s : branch.stations) {
-        std::vector<double> greys;
-        for (int k = 0; k < kSectionAngles; ++k) {
-          const Vec3 p = s.center + (s.radius + 2.5 * voxel_) * s.direction(k, kSectionAngles);
-          if (field_.covers(p)) greys.push_back(field_.at(p));
-        }
-        const double middle = median(greys);
-        for (const double grey : greys) deviations.push_back(std::abs(grey - middle));
-      }
-    }
-    return kNormalScale * median(std::move(deviations));
-  }
-
-  // Of all stations together: the brighter ones' inside, the middle one's outside.
-  WallLevels levels_of_stations() const {
-    std::vector<double> in, out;
-    for (const CaptureBranch& branch : branches_) {
-      for (std::size_t k = 0; k < branch.levels.size(); ++k) {
-        if (!branch.stations[k].clear) continue;
-        if (std::isfinite(branch.levels[k].inside)) in.push_back(branch.levels[k].inside);
-        if (std::isfinite(branch.levels[k].outside)) out.push_back(branch.levels[k].outside);
-      }
-    }
-    std::sort(in.begin(), in.end());
-    return {in.empty() ? 0.0 : in[in.size() * 3 / 4], median(out)};
-  }
-
   // The tree's levels, and how far each branch's own reach towards them.
   void share_levels() {
-    common_ = levels_of_stations();
-    bool lost = !(common_.contrast() > kLeastContrast * noise_around());
-    for (CaptureBranch& branch : branches_) set_evidence(branch);
+    common_ = levels_of_stations(branches_);
+    bool lost = !(common_.contrast() > kLeastContrast * noise_around(field_, branches_));
+    for (CaptureBranch& branch : branches_) set_evidence(field_, common_, branch);
+
     std::vector<double> all;
     for (const CaptureBranch& branch : branches_) all.push_back(branch.evidence);
     lost = lost || median(all) < kGoodEvidence;
-    if (lost) look_around();
+
+    if (lost) {
+      const DiscLevels around = look_around(field_, branches_);
+      common_ = around.levels;
+      reach_ = around.reach;
+    }
+
     for (CaptureBranch& branch : branches_) {
-      fill_levels(branch);
-      set_evidence(branch);
+      fill_levels(common_, branch);
+      set_evidence(field_, common_, branch);
     }
-  }
-
-  void fill_levels(CaptureBranch& branch) const {
-    for (WallLevels& l : branch.levels) {
-      const bool sound = std::isfinite(l.inside) && std::isfinite(l.outside) &&
-                         l.contrast() > kNoEvidence * common_.contrast();
-      if (!sound) l = common_;
-    }
-  }
-
-  // For a tree that lies beside its vessels, or wholly inside them: two means of grey in discs
-  // around all stations, the smallest discs in which they differ about as much as in any.
-  void look_around() {
-    std::vector<WallLevels> found;
-    double most = 0;
-    for (const double reach : kReaches) {
-      reach_ = reach;
-      found.push_back(two_levels(greys_in_discs()));
-      most = std::max(most, found.back().contrast());
-    }
-    std::size_t k = 0;
-    while (found[k].contrast() < kEnoughContrast * most) ++k;
-    reach_ = kReaches[k];
-    common_ = found[k];
-  }
-
-  std::vector<double> greys_in_discs() const {
-    std::vector<double> greys;
-    for (const CaptureBranch& branch : branches_) {
-      for (std::size_t k = 0; k < branch.stations.size(); ++k) {
-        for (const Disc::Cell& cell : disc_at(field_, branch, k, reach_).cells) {
-          greys.push_back(cell.grey);
-        }
-      }
-    }
-    return greys;
   }
 
   // Leads branches that do not lie on their vessels there; those that it found.
@@ -240,16 +137,19 @@ class Capture {
       if (branches_[b].evidence < kGoodEvidence) lost.push_back(b);
     }
     if (lost.empty() || !(common_.contrast() > 0)) return {};
+
     const std::vector<CaptureBranch> before = branches_;
     for (int round = 0; round < kWideRounds && !progress_.should_stop(); ++round) {
       tbb::parallel_for(std::size_t{0}, lost.size(),
                         [&](std::size_t k) { wide_round(branches_[lost[k]], round); });
       find_clear();  // radii are others now
       // What was taken for background may have been half vessel; nearer to the wall it is not.
-      for (CaptureBranch& branch : branches_) measure_levels(branch);
-      const WallLevels nearer = levels_of_stations();
+      for (CaptureBranch& branch : branches_) measure_levels(field_, branch);
+      const WallLevels nearer = levels_of_stations(branches_);
       if (nearer.contrast() > common_.contrast()) common_ = nearer;
     }
+
+    // Those that still lie on nothing go back to where they were.
     std::vector<std::size_t> found;
     for (const std::size_t b : lost) {
       measure_again(branches_[b]);
@@ -265,9 +165,9 @@ class Capture {
   }
 
   void measure_again(CaptureBranch& branch) const {
-    measure_levels(branch);
-    fill_levels(branch);
-    set_evidence(branch);
+    measure_levels(field_, branch);
+    fill_levels(common_, branch);
+    set_evidence(field_, common_, branch);
   }
 
   // Moves a branch by the moments of what is bright around it.
@@ -276,6 +176,8 @@ class Capture {
     for (std::size_t k = 0; k < now.stations.size(); ++k) {
       if (!now.stations[k].clear) continue;
       const Disc disc = disc_at(field_, now, k, 2 * round < kWideRounds ? reach_ : 1.0);
+
+      // Moments of what is bright: f is 1 in the vessel and 0 beside it.
       double area = 0;
       Vec2 moment = Vec2::Zero();
       for (const Disc::Cell& cell : disc.cells) {
@@ -283,31 +185,20 @@ class Capture {
         area += f * disc.cell_area;
         moment += f * disc.cell_area * cell.at;
       }
+
       CaptureStation& s = branch.stations[k];
-      if (area < 0.05 * std::numbers::pi * disc.radius * disc.radius) continue;
+      if (area < kLeastArea * std::numbers::pi * disc.radius * disc.radius) continue;
       Vec2 shift = moment / area;
       const double most = disc.radius / 2;
       if (shift.norm() > most) shift *= most / shift.norm();
       s.center += shift.x() * s.e1 + shift.y() * s.e2;
-      s.radius = std::clamp(std::sqrt(area / std::numbers::pi), 0.6 * s.radius, 1.7 * s.radius);
+      s.radius = std::clamp(std::sqrt(area / std::numbers::pi), kLeastGrowth * s.radius,
+                            kMostGrowth * s.radius);
     }
+
     follow_clear(branch);
     smooth_moves(branch, 2);
     carry_frames(branch.stations);
-  }
-
-  void set_evidence(CaptureBranch& branch) const {
-    std::vector<double> steps;
-    for (const CaptureStation& s : branch.stations) {
-      if (!s.clear) continue;
-      const double in = mean_on_ring(field_, s, std::max(0.3 * s.radius, s.radius - voxel_));
-      const double out = mean_on_ring(field_, s, s.radius + voxel_);
-      if (std::isfinite(in) && std::isfinite(out)) steps.push_back((in - out) / common_.contrast());
-    }
-    // A branch without room to measure is led by its neighbours.
-    double sum = 0;
-    for (const double step : steps) sum += step;
-    branch.evidence = steps.empty() ? 1.0 : sum / static_cast<double>(steps.size());
   }
 
   // The wall's mean offset and first harmonic over the stretch of branch that the station stands
@@ -320,6 +211,8 @@ class Capture {
     const int angles =
         std::max(kFewestAngles,
                  static_cast<int>(std::lround(2 * std::numbers::pi * stations[k].radius / voxel_)));
+
+    // Offsets d(phi) = growth + shift . n(phi), by least squares over all profiles.
     Section section;
     Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
     Vec3 b = Vec3::Zero();
@@ -338,6 +231,8 @@ class Capture {
         ++count;
       }
     }
+
+    // The circle has to be known nearly all round.
     if (4 * count < 3 * slices * angles) return section;
     const Vec3 x = A.ldlt().solve(b);
     section.growth = x(0);
@@ -348,9 +243,11 @@ class Capture {
 
   void narrow_round(CaptureBranch& branch, int round, bool last) const {
     if (branch.evidence < kNoEvidence) return;
-    measure_levels(branch);
-    fill_levels(branch);
+    measure_levels(field_, branch);
+    fill_levels(common_, branch);
     const double half = kWindows[index(round)];
+
+    // All sections are measured where they were, so that the order does not count.
     const CaptureBranch now = branch;
     for (std::size_t k = 0; k < now.stations.size(); ++k) {
       CaptureStation& s = branch.stations[k];
@@ -360,12 +257,14 @@ class Capture {
       const double most = std::max(0.5 * s.radius, voxel_);
       const double length = section.shift.norm();
       s.center += std::min(1.0, most / std::max(length, 1e-300)) * section.shift;
-      s.radius = std::clamp(s.radius + section.growth, 0.6 * s.radius, 1.7 * s.radius);
+      s.radius =
+          std::clamp(s.radius + section.growth, kLeastGrowth * s.radius, kMostGrowth * s.radius);
     }
+
     follow_clear(branch);
     if (!last) smooth_moves(branch, 1);
     carry_frames(branch.stations);
-    if (last) set_evidence(branch);
+    if (last) set_evidence(field_, common_, branch);
   }
 
   // Puts measured stations on smooth axes; the others follow.
@@ -382,6 +281,7 @@ class Capture {
       }
       sections.push_back(std::move(s));
     }
+
     const std::vector<Points3> smooth = smooth_axes(sections);
     for (std::size_t b = 0; b < branches_.size(); ++b) {
       for (std::size_t k = 0; k < branches_[b].stations.size(); ++k) {

@@ -5,11 +5,12 @@
 #include <limits>
 
 #include "base/median.h"
+#include "recovery/capture/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr int kNeighbours = 4;  // sections on either side that moments are averaged over
+using namespace capture_rules;
 
 }  // namespace
 
@@ -49,10 +50,13 @@ Disc disc_at(const GreyField& field, const CaptureBranch& branch, std::size_t k,
   const double voxel = field.voxel_mm();
   const CaptureStation& s = branch.stations[k];
   Disc disc;
-  disc.radius = std::max(1.5 * s.radius + 3 * voxel, reach * (1.5 * s.start_radius + 3 * voxel));
-  const double step = std::max(voxel, disc.radius / 10);
+  disc.radius = std::max(kDiscRadii * s.radius + kDiscVox * voxel,
+                         reach * (kDiscRadii * s.start_radius + kDiscVox * voxel));
+  const double step = std::max(voxel, disc.radius / kDiscCells);
   disc.cell_area = step * step;
   const int cells = static_cast<int>(disc.radius / step);
+
+  // Each cell is the mean of the same place in the sections around.
   const std::size_t from = k > kNeighbours ? k - kNeighbours : 0;
   const std::size_t to = std::min(branch.stations.size() - 1, k + kNeighbours);
   for (int i = -cells; i <= cells; ++i) {
@@ -83,13 +87,16 @@ WallLevels two_levels(std::vector<double> greys) {
     return to > from ? (sums[to] - sums[from]) / static_cast<double>(to - from)
                      : greys[std::min(from, greys.size() - 1)];
   };
+
+  // The threshold halfway between the means of both parts, again and again (Ridler & Calvard:
+  // Picture thresholding using an iterative selection method, IEEE Trans. SMC 8, 1978).
   std::size_t cut = greys.size() / 2;
   for (int k = 0; k < 50; ++k) {
     const double threshold = (mean(0, cut) + mean(cut, greys.size())) / 2;
     cut = static_cast<std::size_t>(std::lower_bound(greys.begin(), greys.end(), threshold) -
                                    greys.begin());
   }
-  const std::size_t fewest = greys.size() / 50;
+  const std::size_t fewest = greys.size() / kFewestPart;
   if (cut < fewest || cut > greys.size() - fewest) return {0.0, 0.0};
   return {mean(cut, greys.size()), mean(0, cut)};
 }

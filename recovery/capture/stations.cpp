@@ -6,14 +6,14 @@
 #include <Eigen/Geometry>
 
 #include "base/index.h"
+#include "recovery/capture/rules.h"
 
 namespace angiospline {
 namespace {
 
-constexpr double kStationRadii = 0.5;  // distance of sections, in radii ...
-constexpr double kStationVox = 1.5;    // ... and at least in voxels
-constexpr int kFewestStations = 4;
+using namespace capture_rules;
 
+// Moves the points from a branch's end to its first measured station over to the node.
 void blend_to_node(CenterlineBranch& branch, const std::vector<CaptureStation>& stations,
                    const Vec3& node, bool at_end) {
   const std::size_t n = stations.size();
@@ -46,6 +46,7 @@ CaptureBranch sampled_branch(const BSplineCurve<4>& path, double voxel) {
   const double radius = path.at(path.knots().first() + length / 2)(3);
   const double step = std::max(kStationVox * voxel, kStationRadii * radius);
   const int count = std::max(kFewestStations, static_cast<int>(std::ceil(length / step)) + 1);
+
   CaptureBranch branch;
   for (int k = 0; k < count; ++k) {
     CaptureStation s;
@@ -76,9 +77,12 @@ void follow_clear(CaptureBranch& branch) {
     if (branch.stations[k].clear) clear.push_back(k);
   }
   if (clear.empty()) return;
+
   for (std::size_t k = 0; k < branch.stations.size(); ++k) {
     CaptureStation& s = branch.stations[k];
     if (s.clear) continue;
+
+    // The nearest clear station, the earlier of two that are equally near.
     const auto after = std::lower_bound(clear.begin(), clear.end(), k);
     const std::size_t nearest = after == clear.begin() ? clear.front()
                                 : *(after - 1) < k     ? *(after - 1)
@@ -86,6 +90,8 @@ void follow_clear(CaptureBranch& branch) {
     const std::size_t other = after == clear.end() ? clear.back() : *after;
     const std::size_t from =
         other > k && (nearest > k || other - k < k - nearest) ? other : nearest;
+
+    // Its move across this station's own axis, and its growth.
     const CaptureStation& guide = branch.stations[from];
     Vec3 move = guide.center - guide.start;
     move -= move.dot(s.tangent) * s.tangent;
@@ -111,6 +117,8 @@ void smooth_moves(CaptureBranch& branch, int passes) {
 CenterlineTree moved_tree(const CenterlineTree& given, const std::vector<CaptureBranch>& branches,
                           const std::vector<std::vector<int>>& at_node, double& mean_move) {
   CenterlineTree tree = given;
+
+  // Nodes first: the mean of what their branches' ends did.
   double sum = 0, count = 0;
   for (std::size_t n = 0; n < at_node.size(); ++n) {
     Vec3 move = Vec3::Zero();
@@ -124,6 +132,8 @@ CenterlineTree moved_tree(const CenterlineTree& given, const std::vector<Capture
     }
     if (ends > 0) tree.nodes[n].position_mm += move / ends;
   }
+
+  // Then branches, which end in their nodes.
   for (std::size_t b = 0; b < branches.size(); ++b) {
     const std::vector<CaptureStation>& stations = branches[b].stations;
     CenterlineBranch& branch = tree.branches[b];

@@ -56,9 +56,11 @@ Scene rings() {
   for (const Ring& ring : phantom_rings()) {
     scene.shapes.push_back(
         torus(ring.centre_mm, ring.axis, ring.ring_radius_mm, ring.tube_radius_mm));
+
     constexpr int kPoints = 180;
     std::vector<Vec3> points;
     for (int i = 0; i <= kPoints; ++i) points.push_back(ring.at(2 * kPi * (i % kPoints) / kPoints));
+
     scene.tree.nodes.push_back({fmt::format("{}_start", names[k]), points.front()});
     add_branch(scene.tree, names[k], k, k, points,
                std::vector<double>(points.size(), ring.tube_radius_mm));
@@ -101,9 +103,11 @@ Scene bifurcation() {
     const double a = degrees * kPi / 180;
     return crotch + length * Vec3(std::sin(a), 0, std::cos(a));
   };
+
   const std::vector<Vec3> ends = {crotch - 42 * Vec3::UnitZ(), along(-30, 50), along(45, 52)};
   const double radii[] = {14, 11, 9};
   const char* names[] = {"parent", "left", "right"};
+
   scene.tree.nodes.push_back({"junction", crotch});
   for (std::size_t k = 0; k < 3; ++k) {
     scene.tree.nodes.push_back({fmt::format("{}_end", names[k]), ends[k]});
@@ -113,6 +117,7 @@ Scene bifurcation() {
     else
       add_branch(scene.tree, names[k], 0, node, {crotch, ends[k]}, {radii[k], radii[k]});
   }
+
   scene.tree.inlets = {1};
   add_tubes(scene);
   return scene;
@@ -167,12 +172,15 @@ Result<void> check(const PhantomOptions& o) {
   };
   if (!(o.spacing_mm.minCoeff() > 0) || !o.spacing_mm.allFinite())
     return bad("spacing is not positive", o.spacing_mm.minCoeff(), "spacing is in mm, above 0");
+
   if (o.snr && !(*o.snr > 0))
     return bad("SNR is not positive", *o.snr, "leave it out for no noise");
+
   if (!(o.field_mm > 0)) return bad("field of view is not positive", o.field_mm, "in mm, above 0");
   if (!(o.radius_min_mm > 0) || !(o.radius_max_mm >= o.radius_min_mm))
     return bad("radii are not usable", o.radius_min_mm, "0 < smallest <= largest");
   if (o.ends < 1) return bad("number of ends is not usable", o.ends, "at least 1");
+
   if (!(o.loss_deg >= 0 && o.loss_deg < 45))
     return bad("stretch of lost signal is not usable", o.loss_deg, "0 to below 45 degrees");
   if (!(o.loss_depth >= 0 && o.loss_depth <= 1))
@@ -208,6 +216,7 @@ void lose_signal(Image<float>& filled, const PhantomOptions& o) {
     if (filled.voxels[i] == 0) continue;
     const Voxel v = filled.grid.voxel(i);
     const Vec3 p = filled.grid.spacing_mm.cwiseProduct(Vec3(v[0], v[1], v[2]));
+
     const Ring* nearest = nullptr;
     double least = std::numeric_limits<double>::infinity();
     for (const Ring& ring : all) {
@@ -215,6 +224,7 @@ void lose_signal(Image<float>& filled, const PhantomOptions& o) {
           torus(ring.centre_mm, ring.axis, ring.ring_radius_mm, ring.tube_radius_mm).inside(p);
       if (d < least) least = d, nearest = &ring;
     }
+
     filled.voxels[i] *= static_cast<float>(ring_signal(*nearest, p, o));
   }
 }
@@ -246,6 +256,7 @@ double potato_radius_mm(const Vec3& direction) {
                                                 {Vec3(0.1, -1, 0.3).normalized(), 3.0, 7},
                                                 {Vec3(0.2, 0.3, 1).normalized(), 4.5, 5},
                                                 {Vec3(-0.3, -0.2, -1).normalized(), 4.0, 5}}};
+
   double radius = 13.0;
   for (const Bulge& b : kBulges) {
     radius += b.height_mm * std::exp(b.sharpness * (b.direction.dot(direction) - 1));
@@ -277,14 +288,18 @@ Result<Phantom> make_phantom(PhantomKind kind, const PhantomOptions& options) {
   if (const auto ok = check(options); !ok) return fail(ok.error());
   Result<Scene> scene = scene_of(kind, options);
   if (!scene) return fail(scene.error());
+
   const ImageGrid grid = grid_for(scene->field_mm, options);
   Image<float> filled = coverage(grid, scene->shapes);
   Phantom out{Image<std::int16_t>(grid), Mask(grid), std::move(scene->tree), scene->description};
   for (std::size_t i = 0; i < filled.voxels.size(); ++i)
     out.truth.voxels[i] = filled.voxels[i] >= 0.5F;
+
   if (options.edges == PhantomEdges::kSteps)
     for (float& f : filled.voxels) f = f >= 0.5F ? 1.0F : 0.0F;
   if (kind == PhantomKind::kRings && options.loss_deg > 0) lose_signal(filled, options);
+
+  // Noise last, so that the same seed gives the same noise whatever the edges.
   const double contrast = options.vessel - options.background;
   const double noise = options.snr ? std::abs(contrast) / *options.snr : 0.0;
   Random random(options.seed);
@@ -294,6 +309,7 @@ Result<Phantom> make_phantom(PhantomKind kind, const PhantomOptions& options) {
     out.image.voxels[i] =
         static_cast<std::int16_t>(std::lround(std::clamp(grey, -32768.0, 32767.0)));
   }
+
   move_to_world(out.tree, grid);
   return out;
 }

@@ -38,6 +38,7 @@ CenterlineBranch branch_from(const Vec3& start, const Vec3& direction, double ra
   const Vec3 middle = start + direction * length / 2;
   const Vec3 end = start + direction * length +
                    perpendicular(direction, random) * length * random.uniform(0, 0.2);
+
   CenterlineBranch b;
   b.points_mm.resize(3, kPointsPerBranch);
   b.radii_mm.resize(kPointsPerBranch);
@@ -66,6 +67,7 @@ class Growth {
         return fail({ErrorKind::kFailed, "random tree found no room", "phantom tree",
                      fmt::format("{} of {} ends placed", ends, o_.ends),
                      "a larger field, a thinner smallest branch or another seed may do"});
+
       if (bifurcate(*tip))
         ++ends;
       else
@@ -105,17 +107,24 @@ class Growth {
     for (int k = 0; k < kTries; ++k) {
       const double share = random_.uniform(0.38, 0.62);
       const double r1 = tip.radius * std::cbrt(share), r2 = tip.radius * std::cbrt(1 - share);
+
+      // Murray's law: r^3 is shared (Murray: The physiological principle of minimum work, PNAS 12,
+      // 1926).
       if (std::min(r1, r2) * (1 - kTaper) < o_.radius_min_mm) continue;
+
       const Vec3 side = perpendicular(tip.direction, random_);
       const Vec3 start = tree_.nodes[static_cast<std::size_t>(tip.node)].position_mm;
+
       // The thinner daughter turns away more, as in vessels.
       const double a1 = random_.uniform(0.45, 0.9) * (1.3 - share);
       const double a2 = random_.uniform(0.45, 0.9) * (0.3 + share);
       const auto d1 = (std::cos(a1) * tip.direction + std::sin(a1) * side).normalized();
       const auto d2 = (std::cos(a2) * tip.direction - std::sin(a2) * side).normalized();
+
       CenterlineBranch b1 = branch_from(start, d1, r1, random_);
       CenterlineBranch b2 = branch_from(start, d2, r2, random_);
       if (a1 + a2 < 0.7 || !has_room(b1, tip.node) || !has_room(b2, tip.node)) continue;
+
       const int node = tip.node;
       tip.closed = true;  // before add(), which may move the tips
       add(std::move(b1), node);
@@ -131,6 +140,7 @@ class Growth {
       const Vec3 p = b.points_mm.col(k);
       const double r = b.radii_mm[k];
       if (p.minCoeff() < r + kGap_mm || p.maxCoeff() > o_.field_mm - r - kGap_mm) return false;
+
       for (const CenterlineBranch& other : tree_.branches)
         for (int j = 0; j < kPointsPerBranch; ++j) {
           const double clear = r + other.radii_mm[j] + kGap_mm;

@@ -32,9 +32,11 @@ Result<std::vector<XrayView>> make_views(const RingsExperimentOptions& options) 
   o.vessel = 1000;
   const auto density = make_phantom(PhantomKind::kRings, o);
   if (!density) return fail(density.error());
+
   Image<float> filled(density->image.grid);
   std::transform(density->image.voxels.begin(), density->image.voxels.end(), filled.voxels.begin(),
                  [](std::int16_t v) { return static_cast<float>(v) / 1000; });
+
   std::vector<XrayView> views;
   std::uint64_t seed = options.seed;
   for (const double angle : {0.0, 30.0, 80.0, 145.0}) {
@@ -59,8 +61,10 @@ Result<RingsExperiment> make_rings_experiment(const RingsExperimentOptions& opti
   o.seed = options.seed;
   auto volume = make_phantom(PhantomKind::kRings, o);
   if (!volume) return fail(volume.error());
+
   auto views = make_views(options);
   if (!views) return fail(views.error());
+
   Mask truth(finer_grid(volume->image.grid, 0.5));
   const std::vector<Ring> rings = phantom_rings();
   for (std::size_t i = 0; i < truth.voxels.size(); ++i)
@@ -104,8 +108,11 @@ RingsMeasure measure_rings(const RingsExperiment& experiment, const Mask& mask) 
     artefact += beyond > 0;
     m.farthest_mm = std::max(m.farthest_mm, beyond);
   }
+
   m.found = static_cast<double>(both) / static_cast<double>(truth);
   if (m.voxels > 0) m.artefact = static_cast<double>(artefact) / static_cast<double>(m.voxels);
+
+  // Which degrees of each ring were reached.
   for (std::size_t r = 0; r < rings.size() && r < m.arc.size(); ++r)
     for (int k = 0; k < 360; ++k) {
       const Vec3 at = mask.grid.index_vox(rings[r].at(k * kPi / 180));
