@@ -14,7 +14,7 @@
 
 #include "benches/junction_classes.h"
 #include "modeling/junction/junction.h"
-#include "modeling/junction/layout.h"
+#include "modeling/layout/layout.h"
 #include "modeling/junction/plan_openings.h"
 #include "modeling/junction/smooth_junction.h"
 

@@ -11,12 +11,10 @@
 #include "base/index.h"
 #include "kernel/evaluate/grid.h"
 #include "modeling/junction/patch_basis.h"
-#include "modeling/junction/rules.h"
+#include "modeling/layout/rules.h"
 
 namespace angiospline {
 namespace {
-
-using namespace junction_rules;
 
 bool is_unit_bezier(const KnotVector& knots) {
   return knots.degree() == kPatchSize - 1 && knots.control_point_count() == kPatchSize &&
@@ -202,18 +200,18 @@ Result<JunctionInNetwork> junction_in_network(const SurfaceNetwork& network, int
 }
 
 JunctionLayout present_layout(const JunctionInNetwork& junction, const SurfaceNetwork& network) {
-  JunctionLayout layout{SharedGrid(junction.topology, kFine), {}, {}, {}};
+  JunctionLayout layout{SharedGrid(junction.topology, layout_rules::kFine), {}, {}, {}};
   const int count = layout.grid.count();
   layout.nodes.resize(3, count);
   layout.normals = Points3::Zero(3, count);
-  const std::vector<double> steps = spaced(0, 1, kFine);
+  const std::vector<double> steps = spaced(0, 1, layout_rules::kFine);
 
   // Nodes on an edge get the mean of both patches' normals.
   for (int p = 0; p < static_cast<int>(junction.patches.size()); ++p) {
     const auto grid =
         evaluate_grid(patch_surface(network, junction.patches[index(p)]), steps, steps, 1);
-    for (int k = 0; k < kFine * kFine; ++k) {
-      const int node = layout.grid.at(p, k / kFine, k % kFine);
+    for (int k = 0; k < layout_rules::kFine * layout_rules::kFine; ++k) {
+      const int node = layout.grid.at(p, k / layout_rules::kFine, k % layout_rules::kFine);
       layout.nodes.col(node) = (grid.points().col(k) - junction.center_mm) / junction.radius_mm;
       const Vec3 normal = Vec3(grid.partial(1, 0).col(k)).cross(Vec3(grid.partial(0, 1).col(k)));
       layout.normals.col(node) += normal.normalized();

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "base/result.h"
-#include "modeling/junction/layout.h"
-#include "modeling/junction/topology.h"
 #include "modeling/junction/unknowns.h"
+#include "modeling/layout/layout.h"
+#include "modeling/layout/topology.h"
 #include "modeling/network/surface_network.h"
 
 namespace angiospline {

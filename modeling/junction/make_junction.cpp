@@ -9,13 +9,13 @@
 
 #include "base/contract.h"
 #include "modeling/junction/junction.h"
-#include "modeling/junction/layout.h"
 #include "modeling/junction/plan_openings.h"
 #include "modeling/junction/quality.h"
 #include "modeling/junction/rules.h"
 #include "modeling/junction/smooth_junction.h"
-#include "modeling/junction/target.h"
-#include "modeling/junction/topology.h"
+#include "modeling/layout/layout.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 namespace {

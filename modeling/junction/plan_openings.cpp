@@ -11,6 +11,7 @@
 
 #include "base/index.h"
 #include "modeling/junction/rules.h"
+#include "modeling/layout/rules.h"
 
 namespace angiospline {
 namespace {
@@ -60,9 +61,10 @@ std::optional<Error> find_spec_defect(const JunctionSpec& spec) {
     return Error{ErrorKind::kBadInput, "too few branches for a junction", junction_name(spec),
                  fmt::format("{}", spec.branches.size()), "a junction has three or more"};
   }
-  if (spec.branches.size() > kMostRays) {
+  if (spec.branches.size() > layout_rules::kMostRays) {
     return Error{ErrorKind::kBadInput, "too many branches for a junction", junction_name(spec),
-                 fmt::format("{}", spec.branches.size()), fmt::format("at most {}", kMostRays)};
+                 fmt::format("{}", spec.branches.size()),
+                 fmt::format("at most {}", layout_rules::kMostRays)};
   }
   if (!spec.center_mm.allFinite()) {
     return Error{ErrorKind::kBadInput, "centre is not finite", junction_name(spec), {}, {}};

@@ -5,7 +5,7 @@
 
 #include "base/result.h"
 #include "modeling/junction/junction.h"
-#include "modeling/junction/target.h"
+#include "modeling/layout/target.h"
 
 namespace angiospline {
 

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "modeling/junction/target.h"
-#include "modeling/junction/topology.h"
 #include "modeling/junction/unknowns.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 

@@ -2,13 +2,13 @@
 // target.
 #pragma once
 
-#include "modeling/junction/layout.h"
 #include "modeling/junction/patch_solver.h"
 #include "modeling/junction/tangent_plane_rows.h"
-#include "modeling/junction/target.h"
 #include "modeling/junction/target_energy.h"
-#include "modeling/junction/topology.h"
 #include "modeling/junction/unknowns.h"
+#include "modeling/layout/layout.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/vector.h"
-#include "modeling/junction/topology.h"
 #include "modeling/junction/unknowns.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 

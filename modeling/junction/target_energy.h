@@ -6,12 +6,12 @@
 
 #include <Eigen/Core>
 
-#include "modeling/junction/layout.h"
 #include "modeling/junction/patch_basis.h"
 #include "modeling/junction/patch_solver.h"
-#include "modeling/junction/target.h"
-#include "modeling/junction/topology.h"
 #include "modeling/junction/unknowns.h"
+#include "modeling/layout/layout.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 

@@ -5,9 +5,9 @@
 #include <limits>
 
 #include "base/index.h"
-#include "modeling/junction/opening_arcs.h"
 #include "modeling/junction/patch_basis.h"
 #include "modeling/junction/rules.h"
+#include "modeling/layout/opening_arcs.h"
 
 namespace angiospline {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "base/index.h"
@@ -146,6 +147,78 @@ Result<void> add_closed_pieces(Model& model, const Mask& pieces, const Image<flo
                       : fmt::format("{} pieces", closed->network.regions.size())));
   model.warnings.insert(model.warnings.end(), closed->warnings.begin(), closed->warnings.end());
   return {};
+}
+
+namespace {
+
+// Sums over the voxels of a connected piece; places are relative to the grid's origin.
+struct PieceSums {
+  double count = 0;
+  Vec3 sum = Vec3::Zero();
+  Mat3 squares = Mat3::Zero();
+};
+
+// The largest first.
+std::vector<PieceSums> sums_of_pieces(const Mask& mask) {
+  const Components components = connected_components(mask, Neighbours::kCorners26);
+  std::vector<PieceSums> pieces(components.list.size());
+  for (std::size_t i = 0; i < mask.voxels.size(); ++i) {
+    const int label = components.labels.voxels[i];
+    if (label == 0) continue;
+    const Voxel v = mask.grid.voxel(i);
+    const Vec3 p = mask.grid.world_mm(Vec3(v[0], v[1], v[2])) - mask.grid.origin_mm;
+    PieceSums& piece = pieces[index(label - 1)];
+    piece.count += 1;
+    piece.sum += p;
+    piece.squares += p * p.transpose();
+  }
+
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const PieceSums& a, const PieceSums& b) { return a.count > b.count; });
+  return pieces;
+}
+
+// The ellipsoid of the piece's second moments: those of a solid one are a fifth of its squared half
+// axes.
+SurfaceNetwork ellipsoid_of(const PieceSums& piece, const ImageGrid& grid,
+                            const std::string& name) {
+  const Vec3 center = piece.sum / piece.count;
+  const Mat3 spread = piece.squares / piece.count - center * center.transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
+  const double least = kThinnestVox * std::cbrt(grid.spacing_mm.prod());
+  const Vec3 half = (5 * axes.eigenvalues()).cwiseMax(least * least).cwiseSqrt();
+  return closed_surface(grid.origin_mm + center, axes.eigenvectors() * half.asDiagonal(), name);
+}
+
+}  // namespace
+
+Result<Model> closed_model(const Mask& mask) {
+  const std::vector<PieceSums> pieces = sums_of_pieces(mask);
+  Model model;
+  model.name = "closed";
+  int small = 0;
+  for (const PieceSums& piece : pieces) {
+    if (piece.count < kFewestClosedVoxels) {
+      ++small;
+      continue;
+    }
+    append(model.network, ellipsoid_of(piece, mask.grid,
+                                       fmt::format("closed_{}", model.network.regions.size() + 1)));
+  }
+
+  if (model.network.patches.empty()) {
+    return fail({ErrorKind::kBadInput,
+                 "the mask has no piece large enough for a surface",
+                 {},
+                 fmt::format("{} pieces", pieces.size()),
+                 fmt::format("a piece has at least {} voxels", kFewestClosedVoxels)});
+  }
+  if (small > 0) {
+    model.warnings.push_back({WarningCode::kPiecesLeftOut,
+                              fmt::format("{} pieces of the mask below {} voxels were left out",
+                                          small, kFewestClosedVoxels)});
+  }
+  return model;
 }
 
 }  // namespace angiospline

@@ -4,10 +4,10 @@
 #include <utility>
 #include <vector>
 
-#include "modeling/junction/layout.h"
 #include "modeling/junction/plan_openings.h"
-#include "modeling/junction/target.h"
-#include "modeling/junction/topology.h"
+#include "modeling/layout/layout.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 

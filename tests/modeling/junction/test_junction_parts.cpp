@@ -8,10 +8,10 @@
 
 #include "base/random.h"
 #include "kernel/numerics/frontal_factor.h"
-#include "modeling/junction/opening_arcs.h"
 #include "modeling/junction/tangent_plane_rows.h"
-#include "modeling/junction/target.h"
-#include "modeling/junction/topology.h"
+#include "modeling/layout/opening_arcs.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 namespace {

@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "modeling/junction/layout_start.h"
-#include "modeling/junction/rules.h"
 #include "modeling/junction/unknowns.h"
+#include "modeling/layout/rules.h"
+#include "modeling/layout/start.h"
 #include "tests/modeling/junction/sample_junction.h"
 
 namespace angiospline {
@@ -35,8 +35,8 @@ TEST(BoundedSeams, KeepSectorsBetweenHalfAndTwiceTheirShare) {
     const std::vector<double> sectors = sectors_of(bounded_seams(wanted));
     double sum = 0;
     for (const double s : sectors) {
-      EXPECT_GT(s, share / 2 - 1e-6);
-      EXPECT_LT(s, std::min(2 * share, std::numbers::pi) + 1e-6);
+      EXPECT_GT(s, layout_rules::kLeastSector * share - 1e-6);
+      EXPECT_LT(s, std::min(layout_rules::kMostSector * share, std::numbers::pi) + 1e-6);
       sum += s;
     }
     EXPECT_NEAR(sum, kTurn, 1e-12);

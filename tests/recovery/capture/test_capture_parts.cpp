@@ -9,6 +9,7 @@
 #include "recovery/capture/axes.h"
 #include "recovery/capture/greys.h"
 #include "recovery/capture/levels.h"
+#include "recovery/capture/rules.h"
 #include "recovery/capture/stations.h"
 #include "recovery/imaging/rasterize/shapes.h"
 
@@ -152,7 +153,7 @@ TEST(DiscAt, CoversItsCircleWithCellsOfEqualArea) {
   const GreyField field(image);
   const CaptureBranch branch = sampled_branch(path(kFrom, kTo, 5), 1.0);
   const Disc disc = disc_at(field, branch, 6, 1.0);
-  EXPECT_NEAR(disc.radius, 1.5 * 5 + 3, 1e-12);
+  EXPECT_NEAR(disc.radius, capture_rules::kDiscRadii * 5 + capture_rules::kDiscVox, 1e-12);
   EXPECT_NEAR(static_cast<double>(disc.cells.size()) * disc.cell_area,
               std::numbers::pi * disc.radius * disc.radius, 0.05 * 346);
   // Its moments are the vessel's.

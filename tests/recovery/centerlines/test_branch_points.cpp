@@ -5,6 +5,7 @@
 
 #include "recovery/centerlines/branch_points.h"
 #include "recovery/centerlines/branch_radii.h"
+#include "recovery/centerlines/centerlines_from_graph.h"
 #include "recovery/centerlines/vessels_from_mask.h"
 #include "recovery/phantoms/phantom.h"
 

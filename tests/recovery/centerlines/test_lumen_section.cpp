@@ -8,6 +8,7 @@
 #include "base/random.h"
 #include "recovery/centerlines/branch_tip.h"
 #include "recovery/centerlines/lumen_section.h"
+#include "recovery/centerlines/rules.h"
 #include "recovery/imaging/rasterize/shapes.h"
 
 namespace angiospline {
@@ -99,7 +100,9 @@ BranchLine line_to(const Vec3& from, const Vec3& to, double radius) {
 
 TEST(BranchTip, OfACutVesselIsItsCut) {
   const Mask mask = mask_of(grid_of(Vec3::Ones()), flat_cylinder(kFrom, kTo, 6));
-  for (const double short_of : {2.0, 5.0, 9.0}) {
+  // A tip is taken on as far as the rules let it go.
+  const double most = centerline_rules::kTip.farthest_radii * 6;
+  for (const double short_of : {2.0, 5.0, most / 2}) {
     const BranchLine line = extended_to_wall(mask, line_to(kMiddle, kTo - short_of * kAxis, 6));
     EXPECT_LT((line.points.back() - kTo).norm(), 0.7);
     ASSERT_EQ(line.points.size(), line.radii.size());

@@ -8,7 +8,9 @@
 #include "recovery/fit/refinement.h"
 #include "recovery/imaging/rasterize/shapes.h"
 #include "recovery/wall/displacement.h"
+#include "recovery/wall/evidence.h"
 #include "recovery/wall/evidence_of_greys.h"
+#include "recovery/wall/wall_greys.h"
 
 namespace angiospline {
 namespace {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "recovery/wall/rules.h"
 #include "recovery/wall/wall_profile.h"
 
 namespace angiospline {
@@ -69,7 +70,7 @@ TEST(ParallelPoint, OfASphereHasTheRadiusOfTheParallelSphere) {
   EXPECT_EQ(q.point_mm, Vec3(1.5, 2, 3));
   EXPECT_NEAR(q.largest_curvature, 1 / 4.5, 1e-14);
   // Past the centre a curvature would have no meaning: it grows to five times at most.
-  EXPECT_NEAR(parallel_point(p, -10).largest_curvature, 5.0 / 4, 1e-14);
+  EXPECT_NEAR(parallel_point(p, -10).largest_curvature, 1 / (4 * wall_rules::kLeastGrowth), 1e-14);
 }
 
 TEST(WallOffset, FindsAPlaneWallWhereverItIsLookedFor) {

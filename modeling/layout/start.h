@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "base/vector.h"
-#include "modeling/junction/layout.h"
-#include "modeling/junction/target.h"
-#include "modeling/junction/topology.h"
+#include "modeling/layout/layout.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 

@@ -1,4 +1,4 @@
-#include "modeling/junction/layout_start.h"
+#include "modeling/layout/start.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,12 +8,12 @@
 #include <Eigen/Geometry>
 
 #include "base/index.h"
-#include "modeling/junction/rules.h"
+#include "modeling/layout/rules.h"
 
 namespace angiospline {
 namespace {
 
-using namespace junction_rules;
+using namespace layout_rules;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 

@@ -1,4 +1,4 @@
-#include "modeling/junction/layout.h"
+#include "modeling/layout/layout.h"
 
 #include <algorithm>
 #include <array>
@@ -11,13 +11,13 @@
 
 #include "base/contract.h"
 #include "base/index.h"
-#include "modeling/junction/layout_start.h"
-#include "modeling/junction/rules.h"
+#include "modeling/layout/rules.h"
+#include "modeling/layout/start.h"
 
 namespace angiospline {
 namespace {
 
-using namespace junction_rules;
+using namespace layout_rules;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 

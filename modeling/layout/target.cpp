@@ -1,4 +1,4 @@
-#include "modeling/junction/target.h"
+#include "modeling/layout/target.h"
 
 #include <algorithm>
 #include <array>
@@ -11,12 +11,12 @@
 #include <Eigen/Geometry>
 
 #include "base/contract.h"
-#include "modeling/junction/rules.h"
+#include "modeling/layout/rules.h"
 
 namespace angiospline {
 namespace {
 
-using namespace junction_rules;
+using namespace layout_rules;
 
 constexpr std::size_t kMostActive = 2 * kMostRays;  // with a core for each
 

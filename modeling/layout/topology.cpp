@@ -1,4 +1,4 @@
-#include "modeling/junction/topology.h"
+#include "modeling/layout/topology.h"
 
 #include <algorithm>
 #include <array>

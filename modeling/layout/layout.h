@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "base/vector.h"
-#include "modeling/junction/target.h"
-#include "modeling/junction/topology.h"
+#include "modeling/layout/target.h"
+#include "modeling/layout/topology.h"
 
 namespace angiospline {
 

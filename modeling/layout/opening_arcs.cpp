@@ -1,4 +1,4 @@
-#include "modeling/junction/opening_arcs.h"
+#include "modeling/layout/opening_arcs.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,12 @@
 #include <Eigen/Dense>
 
 #include "base/contract.h"
-#include "modeling/junction/rules.h"
+#include "modeling/layout/rules.h"
 
 namespace angiospline {
 namespace {
 
-using namespace junction_rules;
+using namespace layout_rules;
 
 using BernsteinRow = Eigen::Matrix<double, 6, 1>;
 
