@@ -36,9 +36,9 @@ if(NOT TARGET Angiospline::ITK)
 endif()
 
 # Only the file formats of VTK: a bare find_package would pull in all of it, windows and Python too.
-find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOCore IOLegacy IOXML)
+find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOCore IOXML)
 if(NOT TARGET Angiospline::VTK)
   add_library(Angiospline::VTK INTERFACE IMPORTED)
   target_link_libraries(Angiospline::VTK INTERFACE
-    VTK::CommonCore VTK::CommonDataModel VTK::IOCore VTK::IOLegacy VTK::IOXML)
+    VTK::CommonCore VTK::CommonDataModel VTK::IOCore VTK::IOXML)
 endif()

@@ -76,6 +76,17 @@ std::vector<SolidFace> read_faces(std::istream& in, std::size_t count) {
   return faces;
 }
 
+// The faces of another program's file.
+std::vector<SolidFace> faces_without_names(const TopoDS_Shape& shape, std::size_t count) {
+  std::vector<SolidFace> faces;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::string name = "face_" + std::to_string(k + 1);
+    faces.push_back({name, FaceKind::kWall, 0.0, face_colour(FaceKind::kWall, name)});
+  }
+  mark_caps(shape, faces);
+  return faces;
+}
+
 // The first table that the text lacks, or nothing. OpenCASCADE's reader would say so on stdout.
 std::optional<std::string> find_missing_table(const std::string& text) {
   std::size_t at = 0;
@@ -115,6 +126,7 @@ Result<Solid> read_brep(const std::filesystem::path& path, const Progress& progr
                    "no line \"" + *missing + "...\"",
                    {}});
     }
+
     std::istringstream file(*text);
     file.imbue(std::locale::classic());
     TopoDS_Shape shape;
@@ -125,15 +137,11 @@ Result<Solid> read_brep(const std::filesystem::path& path, const Progress& progr
     std::size_t count = 0;
     for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) ++count;
     if (count == 0) return bad("holds no face");
+
+    // Our own lines stand behind the shape, at whose end the stream may have stopped.
     file.clear();
     std::vector<SolidFace> faces = read_faces(file, count);
-    if (faces.empty()) {
-      for (std::size_t k = 0; k < count; ++k) {
-        const std::string name = "face_" + std::to_string(k + 1);
-        faces.push_back({name, FaceKind::kWall, 0.0, face_colour(FaceKind::kWall, name)});
-      }
-      mark_caps(shape, faces);
-    }
+    if (faces.empty()) faces = faces_without_names(shape, count);
     return make_solid_value(shape, std::move(faces));
   } catch (const Standard_Failure& failure) {
     return bad(std::string("OpenCASCADE failed: ") + failure.GetMessageString());

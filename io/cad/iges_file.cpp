@@ -1,6 +1,5 @@
 #include "io/cad/iges_file.h"
 
-#include <optional>
 #include <utility>
 
 #include <IGESBasic_Name.hxx>
@@ -10,7 +9,6 @@
 #include <IGESData_GlobalSection.hxx>
 #include <IGESData_IGESModel.hxx>
 #include <Interface_Static.hxx>
-#include <Standard_Failure.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TransferBRep.hxx>
@@ -30,6 +28,7 @@ Handle(TCollection_HAsciiString) text(const std::string& value) {
   return new TCollection_HAsciiString(value.c_str());
 }
 
+// The global section (IGES 5.3, section 2.2.4.3).
 void set_header(const Handle(IGESData_IGESModel) & model, const IgesOptions& options) {
   IGESData_GlobalSection header = model->GlobalSection();
   header.SetSendName(text(options.product));
@@ -69,8 +68,7 @@ void write_names(IGESControl_Writer& writer, const Solid& solid, const IgesOptio
 
 Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& path,
                              const IgesOptions& options, const Progress& progress) {
-  try {
-    const auto lock = lock_exchange();
+  return write_checked(path, [&]() -> Result<void> {
     IGESControl_Controller::Init();
     Interface_Static::SetIVal("write.iges.brep.mode", 1);
     Interface_Static::SetCVal("write.iges.unit", "MM");
@@ -78,50 +76,28 @@ Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& pa
     IGESCAFControl_Writer writer;
     writer.SetNameMode(false);
     writer.SetColorMode(true);
+
     const Handle(TDocStd_Document) document = document_of(solid, options.product);
     const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, "write IGES");
     const bool done = writer.Transfer(document, indicator->Start());
     document->Close();
     if (progress.should_stop()) return fail(cancelled("write IGES"));
     if (!done) return cannot_write(path, "OpenCASCADE could not convert the solid to IGES");
+
     write_names(writer, solid, options);
     set_header(writer.Model(), options);
     if (!writer.Write(path.c_str())) {
       return cannot_write(path, "OpenCASCADE could not write the file");
     }
     return {};
-  } catch (const Standard_Failure& failure) {
-    return cannot_write(path, std::string("OpenCASCADE failed: ") + failure.GetMessageString());
-  }
+  });
 }
 
 Result<Solid> read_iges(const std::filesystem::path& path, Healing healing,
                         const Progress& progress) {
-  if (auto readable = expect_readable(path); !readable) return fail(readable.error());
-  const auto bad = [&](std::string what) {
-    return fail({ErrorKind::kBadInput, std::move(what), path.string(), {}, {}});
-  };
-  try {
-    const auto lock = lock_exchange();
-    IGESControl_Controller::Init();
-    Interface_Static::SetCVal("xstep.cascade.unit", "MM");
-    IGESCAFControl_Reader reader;
-    std::optional<WithoutHealing> unhealed;
-    if (healing == Healing::kNone) unhealed.emplace();
-    reader.SetNameMode(true);
-    reader.SetColorMode(true);
-    if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) return bad("is not an IGES file");
-    Handle(TDocStd_Document) document = empty_document();
-    const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, "read IGES");
-    const bool done = reader.Transfer(document, indicator->Start());
-    if (progress.should_stop()) return fail(cancelled("read IGES"));
-    if (!done) return bad("holds no shape that OpenCASCADE can read");
-    Result<Solid> solid = solid_of(document, path);
-    document->Close();
-    return solid;
-  } catch (const Standard_Failure& failure) {
-    return bad(std::string("OpenCASCADE failed: ") + failure.GetMessageString());
-  }
+  return read_document<IGESCAFControl_Reader>(
+      path, {"IGES", "an IGES"}, healing, progress,
+      [](IGESCAFControl_Reader&) { Interface_Static::SetCVal("xstep.cascade.unit", "MM"); });
 }
 
 }  // namespace

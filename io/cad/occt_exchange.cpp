@@ -84,6 +84,20 @@ void collect_notes(const TDF_Label& label, XCAFDoc_ColorTool& colours, FaceNotes
   }
 }
 
+// Of all shapes of a document and of their parts.
+FaceNotes notes_of(XCAFDoc_ShapeTool& shapes, XCAFDoc_ColorTool& colours) {
+  FaceNotes notes;
+  TDF_LabelSequence all;
+  shapes.GetShapes(all);
+  for (const TDF_Label& label : all) {
+    collect_notes(label, colours, notes);
+    for (TDF_ChildIterator child(label); child.More(); child.Next()) {
+      collect_notes(child.Value(), colours, notes);
+    }
+  }
+  return notes;
+}
+
 int count(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
   int n = 0;
   for (TopExp_Explorer at(shape, kind); at.More(); at.Next()) ++n;
@@ -187,6 +201,7 @@ Result<Solid> solid_of(const Handle(TDocStd_Document) & document,
   const Handle(XCAFDoc_ColorTool) colours = XCAFDoc_DocumentTool::ColorTool(document->Main());
   TDF_LabelSequence free;
   shapes->GetFreeShapes(free);
+
   TopoDS_Shape shape;
   if (free.Length() == 1) {
     shape = XCAFDoc_ShapeTool::GetShape(free.First());
@@ -197,27 +212,20 @@ Result<Solid> solid_of(const Handle(TDocStd_Document) & document,
     for (const TDF_Label& label : free) builder.Add(compound, XCAFDoc_ShapeTool::GetShape(label));
     shape = compound;
   }
-  FaceNotes notes;
-  TDF_LabelSequence all;
-  shapes->GetShapes(all);
-  for (const TDF_Label& label : all) {
-    collect_notes(label, *colours, notes);
-    for (TDF_ChildIterator child(label); child.More(); child.Next()) {
-      collect_notes(child.Value(), *colours, notes);
-    }
-  }
+
+  const FaceNotes notes = notes_of(*shapes, *colours);
   std::vector<SolidFace> faces;
   bool has_names = false;
   if (!shape.IsNull()) {
     for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {
-      const auto note = notes.find(at.Current().TShape().get());
+      const auto found = notes.find(at.Current().TShape().get());
+      const FaceNote note = found != notes.end() ? found->second : FaceNote{};
       SolidFace face;
-      const bool is_named = note != notes.end() && note->second.name && !note->second.name->empty();
+      const bool is_named = note.name && !note.name->empty();
       has_names = has_names || is_named;
-      face.name = is_named ? *note->second.name : "face_" + std::to_string(faces.size() + 1);
+      face.name = is_named ? *note.name : "face_" + std::to_string(faces.size() + 1);
       face.kind = kind_of_name(face.name);
-      face.colour = note != notes.end() && note->second.colour ? *note->second.colour
-                                                               : face_colour(face.kind, face.name);
+      face.colour = note.colour ? *note.colour : face_colour(face.kind, face.name);
       faces.push_back(std::move(face));
     }
   }
@@ -249,6 +257,7 @@ void mark_caps(const TopoDS_Shape& shape, std::vector<SolidFace>& faces) {
     }
     return true;
   };
+
   std::size_t k = 0;
   for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next(), ++k) {
     if (is_cap(at.Current())) faces[k].kind = FaceKind::kCap;
@@ -312,6 +321,8 @@ Result<void> expect_same(const SolidDigest& written, const Solid& read,
   if (written.faces.size() != read.faces.size()) {
     return other_number("faces", static_cast<int>(read.faces.size()));
   }
+
+  // Faces come back in their order; a surface may move by rounding only.
   TopExp_Explorer at(shape, TopAbs_FACE);
   for (std::size_t k = 0; k < written.faces.size(); ++k, at.Next()) {
     const SolidDigest::Face& face = written.faces[k];
@@ -327,6 +338,7 @@ Result<void> expect_same(const SolidDigest& written, const Solid& read,
       return differs(path, "surface moved: " + face.name, std::to_string(*distance) + " mm", rule);
     }
   }
+
   for (TopExp_Explorer shell(shape, TopAbs_SHELL); shell.More(); shell.Next()) {
     if (BRep_Tool::IsClosed(shell.Current())) continue;
     return differs(path, "shell is open after reading back", {}, rule);

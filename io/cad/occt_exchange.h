@@ -5,11 +5,15 @@
 #include <filesystem>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <IFSelect_ReturnStatus.hxx>
 #include <Message_ProgressIndicator.hxx>
 #include <Quantity_Color.hxx>
+#include <Standard_Failure.hxx>
 #include <TDocStd_Document.hxx>
 #include <TopoDS_Shape.hxx>
 #include <XSAlgo_AlgoContainer.hxx>
@@ -111,5 +115,61 @@ class ExchangeProgress : public Message_ProgressIndicator {
   const Progress& progress_;
   std::string stage_;
 };
+
+// A format of files as messages call it.
+struct ExchangeFormat {
+  const char* name;
+  const char* one;  // with its article
+};
+
+// The solid in a file, by the `Reader` of documents that OpenCASCADE has for its format. `prepare`
+// sets what is the format's own before the file is read. Errors: no such file, a folder, an empty
+// file; not of the format; no shape or no face in it; stopped on request; OpenCASCADE failed. All
+// name the file.
+template <typename Reader, typename Prepare>
+Result<Solid> read_document(const std::filesystem::path& path, const ExchangeFormat& format,
+                            Healing healing, const Progress& progress, const Prepare& prepare) {
+  if (auto readable = expect_readable(path); !readable) return fail(readable.error());
+  const auto bad = [&](std::string what) {
+    return fail({ErrorKind::kBadInput, std::move(what), path.string(), {}, {}});
+  };
+  const std::string stage = std::string("read ") + format.name;
+  try {
+    // The reader is made first: its constructor defines the settings that `prepare` changes.
+    const auto lock = lock_exchange();
+    Reader reader;
+    std::optional<WithoutHealing> unhealed;
+    if (healing == Healing::kNone) unhealed.emplace();
+    prepare(reader);
+    reader.SetNameMode(true);
+    reader.SetColorMode(true);
+    if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) {
+      return bad(std::string("is not ") + format.one + " file");
+    }
+
+    Handle(TDocStd_Document) document = empty_document();
+    const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, stage);
+    const bool done = reader.Transfer(document, indicator->Start());
+    if (progress.should_stop()) return fail(cancelled(stage));
+    if (!done) return bad("holds no shape that OpenCASCADE can read");
+
+    Result<Solid> solid = solid_of(document, path);
+    document->Close();
+    return solid;
+  } catch (const Standard_Failure& failure) {
+    return bad(std::string("OpenCASCADE failed: ") + failure.GetMessageString());
+  }
+}
+
+// Runs `write` alone among readers and writers. Errors: its own; OpenCASCADE failed.
+template <typename Write>
+Result<void> write_checked(const std::filesystem::path& path, const Write& write) {
+  try {
+    const auto lock = lock_exchange();
+    return write();
+  } catch (const Standard_Failure& failure) {
+    return cannot_write(path, std::string("OpenCASCADE failed: ") + failure.GetMessageString());
+  }
+}
 
 }  // namespace angiospline

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cstdint>
 #include <fstream>
-#include <optional>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -19,7 +18,6 @@
 #include <STEPConstruct_Styles.hxx>
 #include <STEPControl_Controller.hxx>
 #include <STEPControl_Writer.hxx>
-#include <Standard_Failure.hxx>
 #include <StepBasic_Product.hxx>
 #include <StepData_Protocol.hxx>
 #include <StepData_StepModel.hxx>
@@ -109,6 +107,8 @@ Handle(StepData_StepModel) with_shared_points(const Handle(StepData_StepModel) &
     replaced.insert(point.get());
     point = kept;
   };
+
+  // The control points of curves and surfaces are nearly all points that there are.
   for (int i = 1; i <= model->NbEntities(); ++i) {
     const Handle(Standard_Transient)& entity = model->Value(i);
     if (const auto curve = Handle(StepGeom_BSplineCurve)::DownCast(entity); !curve.IsNull()) {
@@ -123,6 +123,7 @@ Handle(StepData_StepModel) with_shared_points(const Handle(StepData_StepModel) &
       }
     }
   }
+
   const Handle(StepData_StepModel) result = new StepData_StepModel;
   result->SetProtocol(model->Protocol());
   Interface_EntityIterator header = model->Header();
@@ -142,6 +143,7 @@ void set_names_and_colours(const STEPControl_Writer& writer, const Solid& solid,
   STEPConstruct_Styles styles;
   STEPConstruct_DataMapOfAsciiStringTransient predefined_colours;
   STEPConstruct_DataMapOfPointTransient colours;
+
   std::size_t k = 0;
   for (TopExp_Explorer at(solid.shape->shape, TopAbs_FACE); at.More(); at.Next(), ++k) {
     const Handle(StepRepr_RepresentationItem) item = STEPConstruct::FindEntity(made, at.Current());
@@ -151,6 +153,8 @@ void set_names_and_colours(const STEPControl_Writer& writer, const Solid& solid,
         occt_colour(solid.faces[k].colour), predefined_colours, colours);
     styles.AddStyle(item, styles.MakeColorPSA(item, colour, nullptr, nullptr, 0.0), nullptr);
   }
+
+  // Colours are drawn in the context of the shape (ISO 10303-46, presentation styles).
   Handle(StepRepr_RepresentationContext) context;
   for (int i = 1; i <= model->NbEntities(); ++i) {
     const Handle(Standard_Transient)& entity = model->Value(i);
@@ -192,8 +196,7 @@ Result<Handle(StepData_StepModel)> entities_of(const Solid& solid,
 // Takes the solid, and lets it go before the text is made.
 Result<void> write_unchecked(Solid solid, const std::filesystem::path& path,
                              const StepOptions& options, const Progress& progress) {
-  try {
-    const auto lock = lock_exchange();
+  return write_checked(path, [&]() -> Result<void> {
     const auto model = entities_of(std::exchange(solid, {}), path, options, progress);
     if (!model) return fail(model.error());
     StepData_StepWriter text(*model);
@@ -203,42 +206,20 @@ Result<void> write_unchecked(Solid solid, const std::filesystem::path& path,
       return cannot_write(path, "OpenCASCADE could not write the file");
     }
     return {};
-  } catch (const Standard_Failure& failure) {
-    return cannot_write(path, std::string("OpenCASCADE failed: ") + failure.GetMessageString());
-  }
+  });
 }
 
 Result<Solid> read_step(const std::filesystem::path& path, Healing healing,
                         const Progress& progress) {
-  if (auto readable = expect_readable(path); !readable) return fail(readable.error());
-  const auto bad = [&](std::string what) {
-    return fail({ErrorKind::kBadInput, std::move(what), path.string(), {}, {}});
-  };
-  try {
-    const auto lock = lock_exchange();
-    STEPCAFControl_Reader reader;
-    std::optional<WithoutHealing> unhealed;
-    if (healing == Healing::kNone) unhealed.emplace();
-    Interface_Static::SetIVal("read.stepcaf.subshapes.name", 1);
-    Interface_Static::SetCVal("xstep.cascade.unit", "MM");
-    reader.SetNameMode(true);
-    reader.SetColorMode(true);
-    reader.SetLayerMode(false);
-    reader.SetPropsMode(false);
-    reader.SetGDTMode(false);
-    reader.SetMatMode(false);
-    if (reader.ReadFile(path.c_str()) != IFSelect_RetDone) return bad("is not a STEP file");
-    Handle(TDocStd_Document) document = empty_document();
-    const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, "read STEP");
-    const bool done = reader.Transfer(document, indicator->Start());
-    if (progress.should_stop()) return fail(cancelled("read STEP"));
-    if (!done) return bad("holds no shape that OpenCASCADE can read");
-    Result<Solid> solid = solid_of(document, path);
-    document->Close();
-    return solid;
-  } catch (const Standard_Failure& failure) {
-    return bad(std::string("OpenCASCADE failed: ") + failure.GetMessageString());
-  }
+  return read_document<STEPCAFControl_Reader>(
+      path, {"STEP", "a STEP"}, healing, progress, [](STEPCAFControl_Reader& reader) {
+        Interface_Static::SetIVal("read.stepcaf.subshapes.name", 1);
+        Interface_Static::SetCVal("xstep.cascade.unit", "MM");
+        reader.SetLayerMode(false);
+        reader.SetPropsMode(false);
+        reader.SetGDTMode(false);
+        reader.SetMatMode(false);
+      });
 }
 
 }  // namespace

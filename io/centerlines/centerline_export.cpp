@@ -4,7 +4,7 @@
 #include "io/centerlines/csv_centerline.h"
 #include "io/centerlines/graphml_file.h"
 #include "io/centerlines/swc_file.h"
-#include "io/meshes/vtk_file.h"
+#include "io/centerlines/vtp_writer.h"
 
 namespace angiospline {
 

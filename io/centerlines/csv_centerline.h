@@ -4,7 +4,9 @@
 #include <string>
 #include <string_view>
 
-#include "io/centerlines/centerline_file.h"
+#include "base/result.h"
+#include "io/reading/reader_options.h"
+#include "modeling/tree/centerline_tree.h"
 
 namespace angiospline {
 

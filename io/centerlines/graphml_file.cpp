@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
+#include "io/reading/graph_builder.h"
 #include "io/text/text_file.h"
 #include "io/text/xml_reader.h"
 
@@ -46,7 +47,8 @@ Meaning meaning_of(std::string_view attr_name) {
 
 class GraphmlReader {
  public:
-  GraphmlReader(std::string_view text, std::string_view name) : xml_(text, name), name_(name) {}
+  GraphmlReader(std::string_view text, std::string_view name)
+      : xml_(text, name), name_(name), builder_(name) {}
 
   Result<CenterlineTree> read(const CenterlineFileOptions& options) {
     while (true) {
@@ -54,6 +56,7 @@ class GraphmlReader {
       if (!event) return fail(event.error());
       if (*event == XmlReader::Event::kDone) break;
       if (*event != XmlReader::Event::kStart) continue;
+
       Result<void> taken;
       if (xml_.tag() == "key") {
         keys_[std::string(xml_.attribute("id").value_or(""))] =
@@ -65,15 +68,14 @@ class GraphmlReader {
       if (xml_.tag() == "edge") taken = edge();
       if (!taken) return fail(taken.error());
     }
-    if (graph_.points.empty()) {
-      return fail({ErrorKind::kBadInput,
-                   "holds no node",
-                   std::string(name_),
-                   {},
-                   "a GraphML tree has nodes with x, y, z"});
+    if (builder_.point_count() == 0) {
+      return builder_.bad_file("holds no node", "a GraphML tree has nodes with x, y, z");
     }
+
+    // Edges may stand before the nodes they join.
     if (auto linked = link(); !linked) return fail(linked.error());
-    return finish_tree(std::move(graph_), facts_, name_, options);
+    if (is_directed_) start_where_no_edge_enters();
+    return builder_.finish(options);
   }
 
  private:
@@ -96,9 +98,7 @@ class GraphmlReader {
     if (key == keys_.end() || key->second != Meaning::kUnit) return {};
     const Result<double> unit = parse_unit_mm(trimmed_lines(*text));
     if (!unit) return xml_.bad(unit.error().what, *text, unit.error().rule);
-    facts_.unit_mm = *unit;
-    facts_.unit_name = std::string(trimmed_lines(*text));
-    facts_.unit_stated = true;
+    builder_.facts.state_unit(*unit, trimmed_lines(*text));
     return {};
   }
 
@@ -110,26 +110,34 @@ class GraphmlReader {
       if (!event) return fail(event.error());
       if (*event == XmlReader::Event::kEnd && xml_.tag() == end_tag) return data;
       if (*event != XmlReader::Event::kStart || xml_.tag() != "data") continue;
+
       const auto key = keys_.find(std::string(xml_.attribute("key").value_or("")));
       const int line = xml_.line();
       const Result<std::string> text = xml_.text_of_element();
       if (!text) return fail(text.error());
-      const Meaning meaning = key == keys_.end() ? Meaning::kNothing : key->second;
-      const std::string_view value = trimmed_lines(*text);
-      if (meaning == Meaning::kBranch) data.branch = std::string(value);
-      if (meaning == Meaning::kX || meaning == Meaning::kY || meaning == Meaning::kZ) {
-        const Result<double> x = parse_coordinate(value, name_, line);
-        if (!x) return fail(x.error());
-        data.xyz[static_cast<std::size_t>(meaning) - static_cast<std::size_t>(Meaning::kX)] = *x;
-      }
-      if (meaning == Meaning::kRadius || meaning == Meaning::kDiameter) {
-        const Result<double> r = parse_radius(value, name_, line);
-        if (!r) return fail(r.error());
-        if (meaning == Meaning::kRadius || !data.radius) {
-          data.radius = meaning == Meaning::kRadius ? *r : 0.5 * *r;
-        }
+      if (key == keys_.end()) continue;
+      const auto kept = keep(trimmed_lines(*text), key->second, line, data);
+      if (!kept) return fail(kept.error());
+    }
+  }
+
+  Result<void> keep(std::string_view value, Meaning meaning, int line, Data& data) const {
+    if (meaning == Meaning::kBranch) data.branch = std::string(value);
+    if (meaning == Meaning::kX || meaning == Meaning::kY || meaning == Meaning::kZ) {
+      const Result<double> x = parse_coordinate(value, name_, line);
+      if (!x) return fail(x.error());
+      data.xyz[static_cast<std::size_t>(meaning) - static_cast<std::size_t>(Meaning::kX)] = *x;
+    }
+
+    // A radius beats a diameter, whichever comes first.
+    if (meaning == Meaning::kRadius || meaning == Meaning::kDiameter) {
+      const Result<double> r = parse_radius(value, name_, line);
+      if (!r) return fail(r.error());
+      if (meaning == Meaning::kRadius || !data.radius) {
+        data.radius = meaning == Meaning::kRadius ? *r : 0.5 * *r;
       }
     }
+    return {};
   }
 
   Result<void> node() {
@@ -138,17 +146,15 @@ class GraphmlReader {
     const Result<Data> data = data_until("node");
     if (!data) return fail(data.error());
     if (!data->xyz[0] || !data->xyz[1] || !data->xyz[2]) {
-      return fail({ErrorKind::kBadInput, "the node has no position", at_line(name_, line),
-                   quoted_value(id), "data of the names x, y and z"});
+      return builder_.bad("the node has no position", line, quoted_value(id),
+                          "data of the names x, y and z");
     }
-    if (!node_of_.emplace(id, static_cast<int>(graph_.points.size())).second) {
-      return fail({ErrorKind::kBadInput, "the node is defined twice", at_line(name_, line),
-                   quoted_value(id), "ids are unique"});
-    }
+
+    // Radii of 1 stand in where only the edges have them; they are never used.
     nodes_without_radius_ += !data->radius;
-    graph_.points.push_back(
-        {id, Vec3(*data->xyz[0], *data->xyz[1], *data->xyz[2]), data->radius.value_or(1.0)});
-    return {};
+    const Vec3 position(*data->xyz[0], *data->xyz[1], *data->xyz[2]);
+    const int point = builder_.add_point({id, position, data->radius.value_or(1.0)}, line);
+    return builder_.register_id(point, "the node is defined twice");
   }
 
   Result<void> edge() {
@@ -167,45 +173,42 @@ class GraphmlReader {
                                        [](const Edge& e) { return e.data.radius.has_value(); });
     if (!by_edge && nodes_without_radius_ > 0) {
       return fail({ErrorKind::kBadInput, "nodes have no radius", std::string(name_),
-                   fmt::format("{} of {}", nodes_without_radius_, graph_.points.size()),
+                   fmt::format("{} of {}", nodes_without_radius_, builder_.point_count()),
                    "every node or every edge has data of the name radius or diameter"});
     }
-    facts_.notes.push_back(by_edge ? "radii: those of the edges" : "radii: those of the nodes");
+    builder_.facts.notes.push_back(by_edge ? "radii: those of the edges"
+                                           : "radii: those of the nodes");
+
+    PointGraph& graph = builder_.graph;
     std::map<std::string, int> lines;
     for (const Edge& e : edges_) {
-      const auto from = node_of_.find(e.from);
-      const auto to = node_of_.find(e.to);
-      if (from == node_of_.end() || to == node_of_.end()) {
-        return fail({ErrorKind::kBadInput, "the edge's node does not exist", at_line(name_, e.line),
-                     quoted_value(from == node_of_.end() ? e.from : e.to),
-                     "edges join nodes of this file"});
-      }
-      graph_.edges.emplace_back(from->second, to->second);
-      if (by_edge) graph_.edge_radii_mm.push_back(*e.data.radius);
+      auto joined = builder_.add_edge(e.from, e.to, e.line, "edges join nodes of this file");
+      if (!joined) return joined;
+      if (by_edge) graph.edge_radii_mm.push_back(*e.data.radius);
       const auto [line, is_new] =
-          lines.emplace(e.data.branch, static_cast<int>(graph_.line_names.size()));
-      if (is_new) graph_.line_names.push_back(e.data.branch);
-      graph_.line_of_edge.push_back(e.data.branch.empty() ? -1 : line->second);
-    }
-    if (is_directed_) {  // flow enters where no edge does
-      std::vector<bool> entered(graph_.points.size(), false);
-      for (const auto& [from, to] : graph_.edges) entered[index(to)] = true;
-      for (std::size_t p = 0; p < entered.size(); ++p) {
-        if (!entered[p]) graph_.roots.push_back(static_cast<int>(p));
-      }
+          lines.emplace(e.data.branch, static_cast<int>(graph.line_names.size()));
+      if (is_new) graph.line_names.push_back(e.data.branch);
+      graph.line_of_edge.push_back(e.data.branch.empty() ? -1 : line->second);
     }
     return {};
+  }
+
+  void start_where_no_edge_enters() {
+    PointGraph& graph = builder_.graph;
+    std::vector<bool> entered(graph.points.size(), false);
+    for (const auto& [from, to] : graph.edges) entered[index(to)] = true;
+    for (std::size_t p = 0; p < entered.size(); ++p) {
+      if (!entered[p]) graph.roots.push_back(static_cast<int>(p));
+    }
   }
 
   XmlReader xml_;
   std::string_view name_;
   std::map<std::string, Meaning> keys_;
-  std::map<std::string, int> node_of_;
   std::vector<Edge> edges_;
   int nodes_without_radius_ = 0;
   bool is_directed_ = false;
-  PointGraph graph_;
-  FileFacts facts_;
+  GraphBuilder builder_;
 };
 
 std::string escaped(std::string_view text) {
@@ -224,6 +227,94 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
+// Points become nodes in the order of the branches, each followed by the edge that reaches it.
+class GraphmlWriter {
+ public:
+  explicit GraphmlWriter(const CenterlineTree& tree)
+      : tree_(tree), radius_of_(tree.nodes.size(), 0.0) {}
+
+  std::string write() {
+    write_keys();
+    for (const CenterlineBranch& branch : tree_.branches) write_branch(branch);
+    return std::move(out_) + "</graph>\n</graphml>\n";
+  }
+
+ private:
+  // What the data mean (GraphML Primer, "Declaring GraphML-Attributes").
+  void write_keys() {
+    out_ =
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+        "<graphml xmlns=\"http://graphml.graphdrawing.org/xmlns\">\n";
+    for (const char* key : {"x", "y", "z", "radius"}) {
+      fmt::format_to(std::back_inserter(out_),
+                     "<key id=\"{0}\" for=\"node\" attr.name=\"{0}\" attr.type=\"double\"/>\n",
+                     key);
+    }
+    out_ +=
+        "<key id=\"branch\" for=\"edge\" attr.name=\"branch\" attr.type=\"string\"/>\n"
+        "<key id=\"unit\" for=\"graph\" attr.name=\"unit\" attr.type=\"string\"/>\n"
+        "<graph id=\"centerlines\" edgedefault=\"directed\">\n<data key=\"unit\">mm</data>\n";
+  }
+
+  void write_node(std::string_view id, const Vec3& p, double r) {
+    fmt::format_to(std::back_inserter(out_),
+                   "<node id=\"{}\"><data key=\"x\">{}</data><data key=\"y\">{}</data>"
+                   "<data key=\"z\">{}</data><data key=\"radius\">{}</data></node>\n",
+                   escaped(id), p.x(), p.y(), p.z(), r);
+  }
+
+  void write_edge(std::string_view from, std::string_view to, std::string_view branch) {
+    fmt::format_to(std::back_inserter(out_),
+                   "<edge source=\"{}\" target=\"{}\"><data key=\"branch\">{}</data></edge>\n",
+                   escaped(from), escaped(to), escaped(branch));
+  }
+
+  // Writes tree node n when it is met first, with this radius; whether it has this radius.
+  bool meet(int n, double r) {
+    const CenterlineNode& node = tree_.nodes[index(n)];
+    if (!(radius_of_[index(n)] > 0)) {
+      radius_of_[index(n)] = r;
+      write_node(node.name, node.position_mm, r);
+    }
+    return radius_of_[index(n)] == r;
+  }
+
+  void write_branch(const CenterlineBranch& branch) {
+    const Eigen::Index last = branch.points_mm.cols() - 1;
+    const auto copy = [&](Eigen::Index i) {  // a node of the branch's own, and its name
+      std::string id = fmt::format("{}:{}", branch.name, i);
+      write_node(id, branch.points_mm.col(i), branch.radii_mm(i));
+      return id;
+    };
+
+    // GraphML has one radius a node: a branch with another one starts at a copy beside it.
+    std::string before = tree_.nodes[index(branch.from)].name;
+    if (!meet(branch.from, branch.radii_mm(0))) {
+      std::string start = copy(0);
+      write_edge(before, start, branch.name);
+      before = std::move(start);
+    }
+
+    for (Eigen::Index i = 1; i < last; ++i) {
+      std::string here = copy(i);
+      write_edge(before, here, branch.name);
+      before = std::move(here);
+    }
+
+    // The same at its end.
+    if (!meet(branch.to, branch.radii_mm(last))) {
+      std::string end = copy(last);
+      write_edge(before, end, branch.name);
+      before = std::move(end);
+    }
+    write_edge(before, tree_.nodes[index(branch.to)].name, branch.name);
+  }
+
+  const CenterlineTree& tree_;
+  std::vector<double> radius_of_;  // as written with the node; 0 before
+  std::string out_;
+};
+
 }  // namespace
 
 Result<CenterlineTree> parse_graphml(std::string_view text, std::string_view name,
@@ -233,65 +324,6 @@ Result<CenterlineTree> parse_graphml(std::string_view text, std::string_view nam
   return GraphmlReader(*plain, name).read(options);
 }
 
-std::string graphml_text(const CenterlineTree& tree) {
-  std::string out =
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-      "<graphml xmlns=\"http://graphml.graphdrawing.org/xmlns\">\n";
-  for (const char* key : {"x", "y", "z", "radius"}) {
-    fmt::format_to(std::back_inserter(out),
-                   "<key id=\"{0}\" for=\"node\" attr.name=\"{0}\" attr.type=\"double\"/>\n", key);
-  }
-  out +=
-      "<key id=\"branch\" for=\"edge\" attr.name=\"branch\" attr.type=\"string\"/>\n"
-      "<key id=\"unit\" for=\"graph\" attr.name=\"unit\" attr.type=\"string\"/>\n"
-      "<graph id=\"centerlines\" edgedefault=\"directed\">\n<data key=\"unit\">mm</data>\n";
-  const auto node = [&](std::string_view id, const Vec3& p, double r) {
-    fmt::format_to(std::back_inserter(out),
-                   "<node id=\"{}\"><data key=\"x\">{}</data><data key=\"y\">{}</data>"
-                   "<data key=\"z\">{}</data><data key=\"radius\">{}</data></node>\n",
-                   escaped(id), p.x(), p.y(), p.z(), r);
-  };
-  const auto edge = [&](std::string_view from, std::string_view to, std::string_view branch) {
-    fmt::format_to(std::back_inserter(out),
-                   "<edge source=\"{}\" target=\"{}\"><data key=\"branch\">{}</data></edge>\n",
-                   escaped(from), escaped(to), escaped(branch));
-  };
-  std::vector<double> radius_of(tree.nodes.size(), 0.0);
-  for (const CenterlineBranch& branch : tree.branches) {
-    const Eigen::Index last = branch.points_mm.cols() - 1;
-    const auto end = [&](int n,
-                         double r) {  // the node, or a copy of it with the branch's own radius
-      const CenterlineNode& at = tree.nodes[index(n)];
-      if (!(radius_of[index(n)] > 0)) {
-        radius_of[index(n)] = r;
-        node(at.name, at.position_mm, r);
-      }
-      return radius_of[index(n)] == r;
-    };
-    const std::string from = tree.nodes[index(branch.from)].name;
-    const std::string to = tree.nodes[index(branch.to)].name;
-    std::string before = from;
-    if (!end(branch.from, branch.radii_mm(0))) {
-      before = branch.name + ":0";
-      node(before, branch.points_mm.col(0), branch.radii_mm(0));
-      edge(from, before, branch.name);
-    }
-    for (Eigen::Index i = 1; i < last; ++i) {
-      std::string here = fmt::format("{}:{}", branch.name, i);
-      node(here, branch.points_mm.col(i), branch.radii_mm(i));
-      edge(before, here, branch.name);
-      before = std::move(here);
-    }
-    if (end(branch.to, branch.radii_mm(last))) {
-      edge(before, to, branch.name);
-    } else {
-      const std::string copy = fmt::format("{}:{}", branch.name, last);
-      node(copy, branch.points_mm.col(last), branch.radii_mm(last));
-      edge(before, copy, branch.name);
-      edge(copy, to, branch.name);
-    }
-  }
-  return out + "</graph>\n</graphml>\n";
-}
+std::string graphml_text(const CenterlineTree& tree) { return GraphmlWriter(tree).write(); }
 
 }  // namespace angiospline

@@ -1,10 +1,11 @@
 #include "io/centerlines/gxl_file.h"
 
-#include <map>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "io/reading/graph_builder.h"
 #include "io/text/text_file.h"
 #include "io/text/xml_reader.h"
 
@@ -21,7 +22,7 @@ std::string_view attribute(const XmlReader& xml, std::string_view name) {
 class GxlReader {
  public:
   GxlReader(std::string_view text, std::string_view name, const CenterlineFileOptions& options)
-      : xml_(text, name), name_(name), options_(options) {}
+      : xml_(text, name), name_(name), options_(options), builder_(name) {}
 
   Result<CenterlineTree> read() {
     while (true) {
@@ -34,22 +35,27 @@ class GxlReader {
       if (!taken) return fail(taken.error());
     }
     if (edges_.empty()) {
-      return fail({ErrorKind::kBadInput,
-                   "holds no edge",
-                   std::string(name_),
-                   {},
-                   "a GXL tree has nodes with positions and edges with radii"});
+      return builder_.bad_file("holds no edge",
+                               "a GXL tree has nodes with positions and edges with radii");
     }
-    if (auto linked = link(); !linked) return fail(linked.error());
+
+    // Edges may stand before the nodes they join.
+    for (const Edge& e : edges_) {
+      auto joined = builder_.add_edge(e.from, e.to, e.line, "edges join nodes of this file");
+      if (!joined) return fail(joined.error());
+      builder_.graph.edge_radii_mm.push_back(e.radius);
+    }
+
+    // Positions count voxels, radii do not (Hamarneh and Jassi 2010, VascuSynth).
     const double width = options_.voxel_width.value_or(kVascuSynthVoxelWidth);
-    for (GraphPoint& p : graph_.points) p.position_mm *= width;
-    facts_.notes.push_back(fmt::format(
+    for (GraphPoint& p : builder_.graph.points) p.position_mm *= width;
+    builder_.facts.notes.push_back(fmt::format(
         "voxel width: {:g}{}", width,
         options_.voxel_width
             ? ", as given"
             : ", VascuSynth's default (the file does not say; --voxel-width overrides)"));
-    facts_.notes.push_back("edges: straight, each with one radius");
-    return finish_tree(std::move(graph_), facts_, name_, options_);
+    builder_.facts.notes.push_back("edges: straight, each with one radius");
+    return builder_.finish(options_);
   }
 
  private:
@@ -71,6 +77,7 @@ class GxlReader {
       if (!event) return fail(event.error());
       if (*event == XmlReader::Event::kEnd && xml_.tag() == "node") break;
       if (*event != XmlReader::Event::kStart) continue;
+
       if (xml_.tag() == "attr") attr = attribute(xml_, "name");
       if (xml_.tag() == "string" && attr == "nodeType") {
         const Result<std::string> type = xml_.text_of_element();
@@ -78,28 +85,22 @@ class GxlReader {
         is_root = type->find("root") != std::string::npos;
       }
       if (xml_.tag() == "float" && attr == "position") {
-        const int here = xml_.line();
-        const Result<std::string> number = xml_.text_of_element();
-        if (!number) return fail(number.error());
-        const Result<double> x = parse_coordinate(trimmed_lines(*number), name_, here);
+        const Result<double> x = number_of_element(parse_coordinate);
         if (!x) return fail(x.error());
         position.push_back(*x);
       }
     }
     if (position.size() != 3) {
-      return fail({ErrorKind::kBadInput, "the node's position is not complete",
-                   at_line(name_, line), fmt::format("{} numbers", position.size()),
-                   "a position is three numbers"});
+      return builder_.bad("the node's position is not complete", line,
+                          fmt::format("{} numbers", position.size()),
+                          "a position is three numbers");
     }
-    const int number = static_cast<int>(graph_.points.size());
-    if (!node_of_.emplace(id, number).second) {
-      return fail({ErrorKind::kBadInput, "the node is defined twice", at_line(name_, line),
-                   quoted_value(id), "ids are unique"});
-    }
-    if (is_root) graph_.roots.push_back(number);
+
     // The radius is the edges' and not used; it only must be one.
-    graph_.points.push_back({id, Vec3(position[0], position[1], position[2]), 1.0});
-    return {};
+    const Vec3 place(position[0], position[1], position[2]);
+    const int point = builder_.add_point({id, place, 1.0}, line);
+    if (is_root) builder_.graph.roots.push_back(point);
+    return builder_.register_id(point, "the node is defined twice");
   }
 
   Result<void> edge() {
@@ -113,45 +114,34 @@ class GxlReader {
       if (*event != XmlReader::Event::kStart) continue;
       if (xml_.tag() == "attr") attr = attribute(xml_, "name");
       if (xml_.tag() == "float" && attr == "radius") {
-        const int here = xml_.line();
-        const Result<std::string> number = xml_.text_of_element();
-        if (!number) return fail(number.error());
-        const Result<double> r = parse_radius(trimmed_lines(*number), name_, here);
+        const Result<double> r = number_of_element(parse_radius);
         if (!r) return fail(r.error());
         found.radius = *r;
       }
     }
     if (!(found.radius > 0)) {
-      return fail({ErrorKind::kBadInput, "the edge has no radius", at_line(name_, found.line),
-                   fmt::format("{} to {}", quoted_value(found.from), quoted_value(found.to)),
-                   "every edge has an attribute radius"});
+      return builder_.bad("the edge has no radius", found.line,
+                          fmt::format("{} to {}", quoted_value(found.from), quoted_value(found.to)),
+                          "every edge has an attribute radius");
     }
     edges_.push_back(std::move(found));
     return {};
   }
 
-  Result<void> link() {
-    for (const Edge& e : edges_) {
-      const auto from = node_of_.find(e.from);
-      const auto to = node_of_.find(e.to);
-      if (from == node_of_.end() || to == node_of_.end()) {
-        return fail({ErrorKind::kBadInput, "the edge's node does not exist", at_line(name_, e.line),
-                     quoted_value(from == node_of_.end() ? e.from : e.to),
-                     "edges join nodes of this file"});
-      }
-      graph_.edges.emplace_back(from->second, to->second);
-      graph_.edge_radii_mm.push_back(e.radius);
-    }
-    return {};
+  // The number that is the text of the element whose start was the last event.
+  Result<double> number_of_element(Result<double> (*parse)(std::string_view, std::string_view,
+                                                           int)) {
+    const int line = xml_.line();
+    const Result<std::string> text = xml_.text_of_element();
+    if (!text) return fail(text.error());
+    return parse(trimmed_lines(*text), name_, line);
   }
 
   XmlReader xml_;
   std::string_view name_;
   const CenterlineFileOptions& options_;
-  std::map<std::string, int> node_of_;
   std::vector<Edge> edges_;
-  PointGraph graph_;
-  FileFacts facts_;
+  GraphBuilder builder_;
 };
 
 }  // namespace

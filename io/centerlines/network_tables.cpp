@@ -2,23 +2,17 @@
 
 #include <algorithm>
 #include <initializer_list>
-#include <map>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "base/index.h"
+#include "io/reading/graph_builder.h"
 #include "io/text/text_file.h"
 
 namespace angiospline {
 namespace {
-
-char separator_of(std::string_view line) {
-  for (const char c : {';', '\t', ','}) {
-    if (line.find(c) != std::string_view::npos) return c;
-  }
-  return ' ';
-}
 
 // A table with a header line, one row after the other.
 class Table {
@@ -79,32 +73,28 @@ class Table {
   std::vector<std::string> header_;
 };
 
-struct NetworkReader {
+class NetworkReader {
+ public:
   Result<void> read_vertices(Table table) {
     const int id = table.column({"id", "node", "nodeid"});
     const int xyz[3] = {table.column({"posx", "x"}), table.column({"posy", "y"}),
                         table.column({"posz", "z"})};
+    builder_.continue_in(table.name());
     if (id < 0 || xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0) {
-      return fail({ErrorKind::kBadInput,
-                   "is not a table of vertices",
-                   std::string(table.name()),
-                   {},
-                   "its columns are id, pos_x, pos_y, pos_z"});
+      return builder_.bad_file("is not a table of vertices",
+                               "its columns are id, pos_x, pos_y, pos_z");
     }
+
     while (true) {
       const Result<bool> row = table.next_row();
       if (!row) return fail(row.error());
       if (!*row) return {};
-      GraphPoint point{std::string(table.field(id)), Vec3::Zero(), 1.0};
-      for (int k = 0; k < 3; ++k) {
-        const Result<double> x = parse_coordinate(table.field(xyz[k]), table.name(), table.line());
-        if (!x) return fail(x.error());
-        point.position_mm(k) = *x;
-      }
-      if (!node_of.emplace(point.name, static_cast<int>(graph.points.size())).second) {
-        return table.bad("the id is used twice", quoted_value(point.name), "ids are unique");
-      }
-      graph.points.push_back(std::move(point));
+      const Result<Vec3> position =
+          parse_position([&](int k) { return table.field(xyz[k]); }, table.name(), table.line());
+      if (!position) return fail(position.error());
+      const int point =
+          builder_.add_point({std::string(table.field(id)), *position, 1.0}, table.line());
+      if (auto unique = builder_.register_id(point, "the id is used twice"); !unique) return unique;
     }
   }
 
@@ -112,45 +102,42 @@ struct NetworkReader {
     const int from = table.column({"node1id", "source", "from", "node1"});
     const int to = table.column({"node2id", "target", "to", "node2"});
     int radius = table.column({"avgradiusavg", "radiusavg", "avgradius", "radius", "r"});
+    builder_.continue_in(table.name());
     if (radius < 0) {
       radius = table.column({"diameter", "d"});
-      facts.has_diameters = radius >= 0;
+      builder_.facts.has_diameters = radius >= 0;
     }
     if (from < 0 || to < 0 || radius < 0) {
-      return fail({ErrorKind::kBadInput,
-                   "is not a table of edges with radii",
-                   std::string(table.name()),
-                   {},
-                   "its columns are node1id, node2id and avgRadiusAvg, radius or diameter"});
+      return builder_.bad_file(
+          "is not a table of edges with radii",
+          "its columns are node1id, node2id and avgRadiusAvg, radius or diameter");
     }
+
     while (true) {
       const Result<bool> row = table.next_row();
       if (!row) return fail(row.error());
       if (!*row) return {};
-      const auto a = node_of.find(table.field(from));
-      const auto b = node_of.find(table.field(to));
-      if (a == node_of.end() || b == node_of.end()) {
-        return table.bad("the edge's node does not exist",
-                         quoted_value(table.field(a == node_of.end() ? from : to)),
-                         "edges join ids of the vertices");
-      }
+      auto joined = builder_.add_edge(table.field(from), table.field(to), table.line(),
+                                      "edges join ids of the vertices");
+      if (!joined) return joined;
+
       // Voreen writes -1 where an edge is too short to be measured.
       const auto number = parse_number(table.field(radius));
       if (number && *number <= 0) {
-        ++without_radius;
-        graph.edge_radii_mm.push_back(0.0);
+        ++without_radius_;
+        builder_.graph.edge_radii_mm.push_back(0.0);
       } else {
         const Result<double> r = parse_radius(table.field(radius), table.name(), table.line());
         if (!r) return fail(r.error());
-        graph.edge_radii_mm.push_back(*r);
+        builder_.graph.edge_radii_mm.push_back(*r);
       }
-      graph.edges.emplace_back(a->second, b->second);
     }
   }
 
   // Edges without a radius of their own get the mean of those they meet.
   Result<void> complete_radii(std::string_view name) {
-    std::vector<std::pair<double, int>> at(graph.points.size(), {0.0, 0});
+    PointGraph& graph = builder_.graph;
+    std::vector<std::pair<double, int>> at(graph.points.size(), {0.0, 0});  // sum and number
     for (std::size_t e = 0; e < graph.edges.size(); ++e) {
       if (!(graph.edge_radii_mm[e] > 0)) continue;
       for (const int n : {graph.edges[e].first, graph.edges[e].second}) {
@@ -158,6 +145,7 @@ struct NetworkReader {
         ++at[index(n)].second;
       }
     }
+
     for (std::size_t e = 0; e < graph.edges.size(); ++e) {
       if (graph.edge_radii_mm[e] > 0) continue;
       const auto& a = at[index(graph.edges[e].first)];
@@ -171,17 +159,23 @@ struct NetworkReader {
       }
       graph.edge_radii_mm[e] = (a.first + b.first) / (a.second + b.second);
     }
-    if (without_radius > 0) {
-      facts.notes.push_back(fmt::format(
-          "{} edges without a positive radius: given the mean of those they meet", without_radius));
+    if (without_radius_ > 0) {
+      builder_.facts.notes.push_back(
+          fmt::format("{} edges without a positive radius: given the mean of those they meet",
+                      without_radius_));
     }
     return {};
   }
 
-  std::map<std::string, int, std::less<>> node_of;
-  PointGraph graph;
-  FileFacts facts;
-  int without_radius = 0;
+  Result<CenterlineTree> finish(const CenterlineFileOptions& options) {
+    builder_.facts.unit_name = "voxels of 1 mm";
+    builder_.facts.notes.push_back("edges: straight, each with one radius");
+    return builder_.finish(options);
+  }
+
+ private:
+  GraphBuilder builder_{""};
+  int without_radius_ = 0;
 };
 
 }  // namespace
@@ -194,14 +188,13 @@ Result<CenterlineTree> parse_network_tables(std::string_view vertices,
   if (!plain_vertices) return fail(plain_vertices.error());
   const auto plain_edges = plain_text(edges, edges_name);
   if (!plain_edges) return fail(plain_edges.error());
+
   NetworkReader reader;
   if (auto read = reader.read_vertices({*plain_vertices, vertices_name}); !read)
     return fail(read.error());
   if (auto read = reader.read_edges({*plain_edges, edges_name}); !read) return fail(read.error());
   if (auto done = reader.complete_radii(edges_name); !done) return fail(done.error());
-  reader.facts.unit_name = "voxels of 1 mm";
-  reader.facts.notes.push_back("edges: straight, each with one radius");
-  return finish_tree(std::move(reader.graph), reader.facts, edges_name, options);
+  return reader.finish(options);
 }
 
 bool is_vertex_table(std::string_view text) {

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "io/reading/finish_tree.h"
 #include "io/text/text_file.h"
 #include "io/text/xml_reader.h"
 #include "modeling/tree/merge_lines.h"
@@ -15,6 +16,7 @@
 namespace angiospline {
 namespace {
 
+// SimVascular models in centimetres; its files do not say so.
 constexpr double kUnitMm = 10.0;
 
 class SimVascularReader {
@@ -40,6 +42,7 @@ class SimVascularReader {
         group.contours.push_back(*one);
       }
     }
+
     if (!found) {
       return fail({ErrorKind::kBadInput,
                    "is not a SimVascular contour group",
@@ -116,6 +119,7 @@ class SimVascularReader {
         if (xml_.tag() == "point") ring.push_back(*p);
       }
     }
+
     if (ring.size() < 3) {
       return fail({ErrorKind::kBadInput, "the contour has too few points", at_line(name_, line),
                    std::to_string(ring.size()), "a cross-section has at least three"});
@@ -133,18 +137,23 @@ class SimVascularReader {
 
   // Area and centroid of a nearly plane polygon, by the fan of triangles from its first point.
   static void measure(const std::vector<Vec3>& ring, SimVascularContour& found) {
-    Vec3 normal = Vec3::Zero();  // twice the area (Newell)
+    // The sum of the triangles' normals is twice the polygon's area, whatever its shape (Newell).
+    Vec3 normal = Vec3::Zero();
     for (std::size_t i = 1; i + 1 < ring.size(); ++i) {
       normal += (ring[i] - ring[0]).cross(ring[i + 1] - ring[0]);
     }
     const double twice_area = normal.norm();
     if (!(twice_area > 0)) return;
+
+    // The centroid is the triangles' weighted by their areas, with signs: the ring may be concave.
     Vec3 sum = Vec3::Zero();
     for (std::size_t i = 1; i + 1 < ring.size(); ++i) {
       const double part = (ring[i] - ring[0]).cross(ring[i + 1] - ring[0]).dot(normal) / twice_area;
       sum += part * ((ring[i] - ring[0]) + (ring[i + 1] - ring[0])) / 3.0;
     }
     found.center = ring[0] + sum / twice_area;
+
+    // The circle of the same area.
     found.radius = std::sqrt(0.5 * twice_area / std::numbers::pi);
   }
 
@@ -194,6 +203,78 @@ CenterlineLine line_of_path(const SimVascularGroup& group, const std::vector<Vec
   return line_of(points, radii, group.name);
 }
 
+// The files of each vessel; a centerline may be missing.
+struct VesselFiles {
+  std::filesystem::path contours;
+  std::filesystem::path centerline;
+};
+
+// By the stems of their names, so that the order of the list does not matter. Error: a path without
+// contours, which alone say how wide the vessel is.
+Result<std::map<std::string, VesselFiles>> pair_files(
+    const std::vector<std::filesystem::path>& paths) {
+  std::map<std::string, VesselFiles> vessels;
+  for (const std::filesystem::path& path : paths) {
+    std::filesystem::path stem = path;
+    stem.replace_extension();
+    const bool is_path = lower_case(path.extension().string()) == ".pth";
+    VesselFiles& vessel = vessels[stem.string()];
+    (is_path ? vessel.centerline : vessel.contours) = path;
+  }
+
+  for (auto& [stem, vessel] : vessels) {
+    if (!vessel.contours.empty()) continue;
+    std::filesystem::path beside = vessel.centerline;
+    beside.replace_extension(".ctgr");
+    if (std::filesystem::exists(beside)) {
+      vessel.contours = beside;
+      continue;
+    }
+    return fail({ErrorKind::kBadInput,
+                 "a path has no radii",
+                 vessel.centerline.string(),
+                 {},
+                 "give the contour group of the same name (.ctgr), too"});
+  }
+  return vessels;
+}
+
+Result<CenterlineLine> read_vessel(const VesselFiles& files) {
+  const Result<std::string> text = read_text_file(files.contours);
+  if (!text) return fail(text.error());
+  Result<SimVascularGroup> group = parse_ctgr(*text, files.contours.string());
+  if (!group) return fail(group.error());
+  if (group->name.empty()) group->name = files.contours.stem().string();
+  if (files.centerline.empty()) return line_of_contours(*group);
+
+  const Result<std::string> path_text = read_text_file(files.centerline);
+  if (!path_text) return fail(path_text.error());
+  const Result<std::vector<Vec3>> points = parse_pth(*path_text, files.centerline.string());
+  if (!points) return fail(points.error());
+  const int last = group->contours.back().path_point;
+  if (group->contours.front().path_point < 0 || last >= static_cast<int>(points->size())) {
+    return fail({ErrorKind::kBadInput, "a contour is not on the path", files.contours.string(),
+                 std::to_string(last), fmt::format("the path has {} points", points->size())});
+  }
+  return line_of_path(*group, *points);
+}
+
+FileFacts facts_of(const MergedLines& merged, std::size_t vessels, bool with_paths) {
+  FileFacts facts;
+  facts.unit_mm = kUnitMm;
+  facts.unit_name = "cm, SimVascular's habit";
+  facts.notes.push_back(fmt::format(
+      "{} vessels: radii are those of circles of the contours' areas, points {}", vessels,
+      with_paths ? "the paths' between the contours, moved to their centroids"
+                 : "their centroids"));
+  facts.notes.push_back(
+      fmt::format("{} ends joined to the vessel whose lumen they lie in", merged.attached));
+  if (merged.overlapping > 0) {
+    facts.notes.push_back(fmt::format("{} vessels merged where they overlap", merged.overlapping));
+  }
+  return facts;
+}
+
 }  // namespace
 
 Result<SimVascularGroup> parse_ctgr(std::string_view text, std::string_view name) {
@@ -210,69 +291,28 @@ Result<std::vector<Vec3>> parse_pth(std::string_view text, std::string_view name
 
 Result<CenterlineTree> read_simvascular(const std::vector<std::filesystem::path>& paths,
                                         const CenterlineFileOptions& options) {
-  // Vessels by the name of their files, so that the order of the list does not matter.
-  std::map<std::string, std::filesystem::path> contours;
-  std::map<std::string, std::filesystem::path> centerlines;
-  std::string names;
-  for (const std::filesystem::path& path : paths) {
-    std::filesystem::path stem = path;
-    stem.replace_extension();
-    const bool is_path = lower_case(path.extension().string()) == ".pth";
-    (is_path ? centerlines : contours)[stem.string()] = path;
-    names += (names.empty() ? "" : ", ") + path.filename().string();
-  }
-  for (const auto& [stem, path] : centerlines) {
-    std::filesystem::path beside = path;
-    beside.replace_extension(".ctgr");
-    if (contours.count(stem) == 0 && std::filesystem::exists(beside)) contours[stem] = beside;
-    if (contours.count(stem) > 0) continue;
-    return fail({ErrorKind::kBadInput,
-                 "a path has no radii",
-                 path.string(),
-                 {},
-                 "give the contour group of the same name (.ctgr), too"});
-  }
+  const auto vessels = pair_files(paths);
+  if (!vessels) return fail(vessels.error());
+
   std::vector<CenterlineLine> lines;
-  int with_path = 0;
-  for (const auto& [stem, path] : contours) {
-    const Result<std::string> text = read_text_file(path);
-    if (!text) return fail(text.error());
-    Result<SimVascularGroup> group = parse_ctgr(*text, path.string());
-    if (!group) return fail(group.error());
-    if (group->name.empty()) group->name = path.stem().string();
-    const auto centerline = centerlines.find(stem);
-    if (centerline == centerlines.end()) {
-      lines.push_back(line_of_contours(*group));
-      continue;
-    }
-    const Result<std::string> path_text = read_text_file(centerline->second);
-    if (!path_text) return fail(path_text.error());
-    const Result<std::vector<Vec3>> points = parse_pth(*path_text, centerline->second.string());
-    if (!points) return fail(points.error());
-    const int last = group->contours.back().path_point;
-    if (group->contours.front().path_point < 0 || last >= static_cast<int>(points->size())) {
-      return fail({ErrorKind::kBadInput, "a contour is not on the path", path.string(),
-                   std::to_string(last), fmt::format("the path has {} points", points->size())});
-    }
-    lines.push_back(line_of_path(*group, *points));
-    ++with_path;
+  bool with_paths = false;
+  for (const auto& [stem, files] : *vessels) {
+    Result<CenterlineLine> line = read_vessel(files);
+    if (!line) return fail(line.error());
+    lines.push_back(*std::move(line));
+    with_paths = with_paths || !files.centerline.empty();
   }
+
   // The widest vessel first: the others are joined to it.
   std::stable_sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) {
     return a.radii_mm.mean() > b.radii_mm.mean();
   });
   MergedLines merged = merge_lines(lines);
-  FileFacts facts;
-  facts.unit_mm = kUnitMm;
-  facts.unit_name = "cm, SimVascular's habit";
-  facts.notes.push_back(fmt::format(
-      "{} vessels: radii are those of circles of the contours' areas, points {}", lines.size(),
-      with_path > 0 ? "the paths' between the contours, moved to their centroids"
-                    : "their centroids"));
-  facts.notes.push_back(
-      fmt::format("{} ends joined to the vessel whose lumen they lie in", merged.attached));
-  if (merged.overlapping > 0) {
-    facts.notes.push_back(fmt::format("{} vessels merged where they overlap", merged.overlapping));
+  const FileFacts facts = facts_of(merged, lines.size(), with_paths);
+
+  std::string names;
+  for (const std::filesystem::path& path : paths) {
+    names += (names.empty() ? "" : ", ") + path.filename().string();
   }
   return finish_tree(std::move(merged.graph), facts, names, options);
 }

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
+#include "io/reading/graph_builder.h"
 #include "io/text/text_file.h"
 
 namespace angiospline {
@@ -18,12 +19,6 @@ struct SwcPoint {
   long long parent;
   int line;
 };
-
-tl::unexpected<Error> bad(std::string what, std::string_view name, int line, std::string value,
-                          std::string rule) {
-  return fail({ErrorKind::kBadInput, std::move(what), at_line(name, line), std::move(value),
-               std::move(rule)});
-}
 
 // A comment like "# unit: um" or "# units = micrometre".
 void read_unit(std::string_view comment, FileFacts& facts) {
@@ -40,77 +35,108 @@ void read_unit(std::string_view comment, FileFacts& facts) {
     rest.remove_prefix(word.size());
     const Result<double> unit = parse_unit_mm(word);
     if (!unit || parse_number(word)) continue;
-    facts.unit_mm = *unit;
-    facts.unit_name = std::string(word);
-    facts.unit_stated = true;
+    facts.state_unit(*unit, word);
     return;
   }
 }
 
 class SwcReader {
  public:
-  SwcReader(std::string_view text, std::string_view name) : lines_(text), name_(name) {}
+  SwcReader(std::string_view text, std::string_view name)
+      : lines_(text), name_(name), builder_(name) {}
 
   Result<CenterlineTree> read(const CenterlineFileOptions& options) {
     if (auto read = read_points(); !read) return fail(read.error());
     if (auto linked = link_parents(); !linked) return fail(linked.error());
-    if (auto tree = check_cycles(); !tree) return fail(tree.error());
-    return finish_tree(std::move(graph_), facts_, name_, options);
+    if (auto tree = builder_.check_parents(parent_of_); !tree) return fail(tree.error());
+    return builder_.finish(options);
   }
 
  private:
   Result<void> read_points() {
     while (const auto line = lines_.next()) {
       const std::size_t comment = line->find('#');
-      if (comment != std::string_view::npos) read_unit(line->substr(comment + 1), facts_);
+      if (comment != std::string_view::npos) read_unit(line->substr(comment + 1), builder_.facts);
+
       split_fields(line->substr(0, comment), ' ', fields_);
       if (fields_.empty()) continue;
       if (auto added = add_point(); !added) return added;
     }
     if (points_.empty()) {
-      return fail({ErrorKind::kBadInput,
-                   "holds no point",
-                   std::string(name_),
-                   {},
-                   "a line is: id type x y z radius parent"});
+      return builder_.bad_file("holds no point", "a line is: id type x y z radius parent");
     }
     return {};
   }
 
+  // Cannon et al. 1998 (J. Neurosci. Methods 84), who gave the format its seven columns.
   Result<void> add_point() {
     const int line = lines_.line();
     if (fields_.size() < kColumns) {
-      return bad("the line is cut short", name_, line, fmt::format("{} values", fields_.size()),
-                 "a line is: id type x y z radius parent");
+      return builder_.bad("the line is cut short", line, fmt::format("{} values", fields_.size()),
+                          "a line is: id type x y z radius parent");
     }
     const auto id = parse_whole_number(fields_[0]);
     const auto parent = parse_whole_number(fields_[6]);
     if (!id || *id < 0) {
-      return bad("the id is not a whole number from 0", name_, line,
-                 fmt::format("'{}'", quoted_value(fields_[0])),
-                 "the first value is the point's id");
+      return builder_.bad("the id is not a whole number from 0", line,
+                          fmt::format("'{}'", quoted_value(fields_[0])),
+                          "the first value is the point's id");
     }
     if (!parent) {
-      return bad("the parent is not a whole number", name_, line,
-                 fmt::format("'{}'", quoted_value(fields_[6])),
-                 "the seventh value is the parent's id or -1");
+      return builder_.bad("the parent is not a whole number", line,
+                          fmt::format("'{}'", quoted_value(fields_[6])),
+                          "the seventh value is the parent's id or -1");
     }
-    GraphPoint point;
-    for (int k = 0; k < 3; ++k) {
-      const Result<double> x = parse_coordinate(fields_[index(2 + k)], name_, line);
-      if (!x) return fail(x.error());
-      point.position_mm(k) = *x;
-    }
+
+    const Result<Vec3> position =
+        parse_position([&](int k) { return fields_[index(2 + k)]; }, name_, line);
+    if (!position) return fail(position.error());
     const Result<double> r = parse_radius(fields_[5], name_, line);
     if (!r) return fail(r.error());
-    point.radius_mm = *r;
-    point.name = std::to_string(*id);
-    graph_.points.push_back(std::move(point));
+    builder_.add_point({std::to_string(*id), *position, *r}, line);
     points_.push_back({*id, *parent, line});
     return {};
   }
 
   Result<void> link_parents() {
+    const Result<std::vector<int>> order = order_by_id();
+    if (!order) return fail(order.error());
+
+    // Some programs count from 1 and write 0 for "no parent".
+    const bool zero_is_root = points_[index(order->front())].id != 0;
+    int zero_roots = 0;
+    parent_of_.assign(points_.size(), -1);
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const SwcPoint& p = points_[i];
+      const int here = static_cast<int>(i);
+      if (p.parent == -1 || (p.parent == 0 && zero_is_root)) {
+        builder_.graph.roots.push_back(here);
+        zero_roots += p.parent == 0;
+        continue;
+      }
+      const auto found =
+          std::lower_bound(order->begin(), order->end(), p.parent,
+                           [&](int a, long long id) { return points_[index(a)].id < id; });
+      if (found == order->end() || points_[index(*found)].id != p.parent) {
+        return builder_.missing_parent(
+            here, std::to_string(p.parent),
+            "a parent is the id of a point of this file, or -1 for a root");
+      }
+      parent_of_[i] = *found;
+      builder_.graph.edges.emplace_back(*found, here);
+    }
+
+    std::vector<std::string>& notes = builder_.facts.notes;
+    if (zero_roots > 0) notes.push_back("parent 0: a root, since no point has the id 0");
+    if (builder_.graph.roots.size() > 1) {
+      notes.push_back(fmt::format("{} roots: as many trees, unless they share a position",
+                                  builder_.graph.roots.size()));
+    }
+    return {};
+  }
+
+  // The points by their ids, which are numbers here: sorting them takes less than a map of texts.
+  Result<std::vector<int>> order_by_id() const {
     std::vector<int> order(points_.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
     std::stable_sort(order.begin(), order.end(),
@@ -119,52 +145,10 @@ class SwcReader {
       const SwcPoint& a = points_[index(order[i - 1])];
       const SwcPoint& b = points_[index(order[i])];
       if (a.id != b.id) continue;
-      return bad("the id is used twice", name_, b.line, std::to_string(b.id),
-                 fmt::format("ids are unique; line {} has it too", a.line));
+      return builder_.bad("the id is used twice", b.line, std::to_string(b.id),
+                          fmt::format("ids are unique; line {} has it too", a.line));
     }
-    const bool zero_is_root = points_[index(order.front())].id != 0;
-    int zero_roots = 0;
-    parent_of_.assign(points_.size(), -1);
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      const SwcPoint& p = points_[i];
-      if (p.parent == -1 || (p.parent == 0 && zero_is_root)) {
-        graph_.roots.push_back(static_cast<int>(i));
-        zero_roots += p.parent == 0;
-        continue;
-      }
-      const auto found =
-          std::lower_bound(order.begin(), order.end(), p.parent,
-                           [&](int a, long long id) { return points_[index(a)].id < id; });
-      if (found == order.end() || points_[index(*found)].id != p.parent) {
-        return bad("the parent does not exist", name_, p.line, std::to_string(p.parent),
-                   "a parent is the id of a point of this file, or -1 for a root");
-      }
-      parent_of_[i] = *found;
-      graph_.edges.emplace_back(*found, static_cast<int>(i));
-    }
-    if (zero_roots > 0) facts_.notes.push_back("parent 0: a root, since no point has the id 0");
-    if (graph_.roots.size() > 1) {
-      facts_.notes.push_back(fmt::format("{} roots: as many trees, unless they share a position",
-                                         graph_.roots.size()));
-    }
-    return {};
-  }
-
-  // Every walk to the parents must end at a root; each point is passed once.
-  Result<void> check_cycles() const {
-    std::vector<int> walk(points_.size(), -1);
-    for (std::size_t start = 0; start < points_.size(); ++start) {
-      int p = static_cast<int>(start);
-      while (p >= 0 && walk[index(p)] < 0) {
-        walk[index(p)] = static_cast<int>(start);
-        p = parent_of_[index(p)];
-      }
-      if (p < 0 || walk[index(p)] != static_cast<int>(start)) continue;
-      const SwcPoint& found = points_[index(p)];
-      return bad("the point is its own ancestor", name_, found.line, std::to_string(found.id),
-                 "parents lead to a root, without a cycle");
-    }
-    return {};
+    return order;
   }
 
   LineReader lines_;
@@ -172,8 +156,7 @@ class SwcReader {
   std::vector<std::string_view> fields_;
   std::vector<SwcPoint> points_;
   std::vector<int> parent_of_;
-  PointGraph graph_;
-  FileFacts facts_;
+  GraphBuilder builder_;
 };
 
 }  // namespace
@@ -199,6 +182,7 @@ class SwcWriter {
     const auto at = branches_at_nodes(tree_);
     std::vector<bool> written(tree_.branches.size(), false);
     std::vector<int> queue;
+
     const auto visit = [&](int start) {
       if (id_of_[index(start)] >= 0) return;
       queue.push_back(start);
@@ -211,6 +195,8 @@ class SwcWriter {
         }
       }
     };
+
+    // What no inlet reaches starts at any of its nodes.
     for (const int n : tree_.inlets) visit(n);
     for (std::size_t n = 0; n < tree_.nodes.size(); ++n) visit(static_cast<int>(n));
     return std::move(text_);
@@ -243,11 +229,13 @@ class SwcWriter {
     const bool along = branch.from == start;
     const auto at = [&](Eigen::Index i) { return along ? i : count - 1 - i; };
     const int other = along ? branch.to : branch.from;
+
     if (id_of_[index(start)] < 0) {
       id_of_[index(start)] = node_id(start);
       radius_of_[index(start)] = branch.radii_mm(at(0));
       line(id_of_[index(start)], tree_.nodes[index(start)].position_mm, branch.radii_mm(at(0)), -1);
     }
+
     long long parent = id_of_[index(start)];
     if (branch.radii_mm(at(0)) != radius_of_[index(start)]) {
       // SWC has one radius a point: a copy of the node's point, at its place, keeps this branch's
@@ -256,11 +244,14 @@ class SwcWriter {
       line(id, tree_.nodes[index(start)].position_mm, branch.radii_mm(at(0)), parent);
       parent = id;
     }
+
     for (Eigen::Index i = 1; i + 1 < count; ++i) {
       const long long id = fresh_id();
       line(id, branch.points_mm.col(at(i)), branch.radii_mm(at(i)), parent);
       parent = id;
     }
+
+    // A node that is met again closes a loop: the last point repeats its position.
     const bool met = id_of_[index(other)] >= 0;
     const long long last = met ? fresh_id() : node_id(other);
     if (!met) {

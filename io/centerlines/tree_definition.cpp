@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
+#include "io/reading/finish_tree.h"
 #include "io/text/text_file.h"
 
 namespace angiospline {
@@ -36,7 +37,8 @@ struct DefinedBranch {
   std::vector<PathPoint> points;  // between the nodes
 };
 
-// Barry and Goldman's pyramid for the centripetal Catmull-Rom segment from b to c.
+// Barry and Goldman's pyramid (1988) for the Catmull-Rom segment from p[1] to p[2], with
+// centripetal knots (Yuksel, Schaefer and Keyser 2011): it has no cusp and no loop.
 Vec3 catmull_rom(const std::array<Vec3, 4>& p, double u) {
   std::array<double, 4> t{};
   for (std::size_t i = 1; i < 4; ++i) t[i] = t[i - 1] + std::sqrt((p[i] - p[i - 1]).norm());
@@ -67,6 +69,7 @@ class DefinitionReader {
                    {},
                    "branch NAME FROM TO RADIUS"});
     }
+
     for (int b = 0; b < static_cast<int>(branches_.size()); ++b) {
       if (auto sampled = sample(b); !sampled) return fail(sampled.error());
     }
@@ -104,20 +107,12 @@ class DefinitionReader {
     if (!nodes_.empty()) return bad("the unit comes too late", words_[1], "before the first node");
     const Result<double> mm = parse_unit_mm(words_[1]);
     if (!mm) return bad(mm.error().what, words_[1], mm.error().rule);
-    facts_.unit_mm = *mm;
-    facts_.unit_name = std::string(words_[1]);
-    facts_.unit_stated = true;
+    facts_.state_unit(*mm, words_[1]);
     return {};
   }
 
   Result<Vec3> position(std::size_t first) const {
-    Vec3 p;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Result<double> x = parse_coordinate(words_[first + k], name_, lines_.line());
-      if (!x) return fail(x.error());
-      p(static_cast<Eigen::Index>(k)) = *x;
-    }
-    return p;
+    return parse_position([&](int k) { return words_[first + index(k)]; }, name_, lines_.line());
   }
 
   Result<void> node() {
@@ -190,10 +185,12 @@ class DefinitionReader {
     std::size_t given = 0;
     for (std::size_t i = 1; i < path.size(); ++i) {
       if (!path[i].radius) continue;
+
       double whole = 0;
       for (std::size_t k = given + 1; k <= i; ++k) {
         whole += (path[k].position - path[k - 1].position).norm();
       }
+
       double part = 0;
       for (std::size_t k = given + 1; k < i; ++k) {
         part += (path[k].position - path[k - 1].position).norm();
@@ -227,9 +224,8 @@ class DefinitionReader {
     graph_.line_of_edge.push_back(static_cast<int>(graph_.line_names.size()) - 1);
   }
 
-  Result<void> sample(int number) {
-    DefinedBranch& b = branches_[index(number)];
-    graph_.line_names.push_back(b.name);
+  // The nodes' places and the points between them, without repeated places.
+  std::vector<PathPoint> path_of(const DefinedBranch& b) const {
     std::vector<PathPoint> path;
     path.push_back({nodes_[index(b.from)], b.first_radius});
     path.insert(path.end(), b.points.begin(), b.points.end());
@@ -239,12 +235,21 @@ class DefinitionReader {
                    path.begin(), path.end(),
                    [](const PathPoint& p, const PathPoint& q) { return p.position == q.position; }),
                path.end());
+    return path;
+  }
+
+  Result<void> sample(int number) {
+    const DefinedBranch& b = branches_[index(number)];
+    graph_.line_names.push_back(b.name);
+    const std::vector<PathPoint> path = path_of(b);
     if (path.size() < 2) {
       return fail({ErrorKind::kBadInput, "the branch has no length", at_line(name_, b.line),
                    fmt::format("'{}'", quoted_value(b.name)), "it must leave its first node"});
     }
+
     int before = end_point(b.from, b.first_radius);
     for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+      // At an end of the branch its last step goes on, mirrored, as the fourth point of the spline.
       const Vec3& p = path[i].position;
       const Vec3& q = path[i + 1].position;
       const std::array<Vec3, 4> around = {
@@ -254,6 +259,7 @@ class DefinitionReader {
       const double radius = std::min(*path[i].radius, *path[i + 1].radius);
       const int samples = static_cast<int>(std::clamp(std::ceil(length / (kSampleRadii * radius)),
                                                       1.0, static_cast<double>(kMostSamples)));
+
       for (int k = 1; k <= samples; ++k) {
         const double u = static_cast<double>(k) / samples;
         const double r = (1 - u) * *path[i].radius + u * *path[i + 1].radius;

@@ -5,7 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "io/centerlines/vtk_polylines.h"
+#include "io/reading/finish_tree.h"
+#include "io/reading/vtk_polylines.h"
 #include "io/text/text_file.h"
 #include "modeling/tree/merge_lines.h"
 
@@ -26,8 +27,12 @@ class LinesToTree {
     }
     if (auto found = find_radii(); !found) return fail(found.error());
     if (auto good = check_used_points(); !good) return fail(good.error());
+
+    // 3D Slicer says the frame in the header.
     if (lines_.header.find("SPACE=LPS") != std::string::npos) facts_.frame = CoordinateFrame::kLps;
     if (lines_.header.find("SPACE=RAS") != std::string::npos) facts_.frame = CoordinateFrame::kRas;
+
+    // VMTK repeats the way from the inlet in every line: what runs together is one vessel.
     if (shares_points_) return finish_tree(graph(), facts_, name_, options);
     MergedLines merged = merge_lines(separate_lines());
     if (merged.overlapping > 0) {

@@ -1,4 +1,4 @@
-// Between io/images/image_file.cpp and the files that know the format libraries. Not installed.
+// What the files of this room share: formats, checks, and the calls into the format libraries.
 #pragma once
 
 #include <filesystem>
@@ -13,6 +13,23 @@ namespace angiospline::image_formats {
 
 enum class Format { kNifti, kNrrd, kMeta, kTiff, kPng, kDicom };
 
+const char* title(Format format);  // as people write it: "NIfTI"
+
+struct ImageSuffix {
+  const char* text;
+  Format format;
+  bool reads;
+  bool writes;
+};
+
+// What the file's name ends with, whatever its case; null for a suffix that is not known, such as
+// VTI's, which has readers of its own.
+const ImageSuffix* suffix_of(const std::filesystem::path& path);
+bool is_vti(const std::filesystem::path& path);
+
+tl::unexpected<Error> bad_image(const std::filesystem::path& path, std::string what,
+                                std::string value = {}, std::string rule = {});
+
 // What a file says of itself, before its voxels are read. Axes of extent 1 beyond the second are
 // kept; `axes` lists every extent the file declares.
 struct Description {
@@ -25,6 +42,13 @@ Result<Description> describe(const std::filesystem::path& path, Format format);
 
 // The voxels of a file with one component a voxel and at most three axes longer than 1.
 Result<AnyImage> read_voxels(const std::filesystem::path& path, Format format);
+
+// Whether an image has one value a voxel and `wanted` dimensions, 2 or 3. 3-D means exactly three
+// axes longer than 1, the first three; a trailing time axis of one is fine. Extents go up to 65535.
+Result<void> check_axes(const Description& d, const std::filesystem::path& path, int wanted);
+
+// The voxels of a file that has `dimensions`.
+Result<AnyImage> read_one(const std::filesystem::path& path, Format format, int dimensions);
 
 // What ITK passes over in silence. A NIfTI file: cut short, spacing 0 or not a number, negative
 // extents are errors; scaling that is not finite and missing orientation are notes.

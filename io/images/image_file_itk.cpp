@@ -36,24 +36,6 @@ namespace {
 
 using Component = itk::IOComponentEnum;
 
-const char* name_of(Format format) {
-  switch (format) {
-    case Format::kNifti:
-      return "NIfTI";
-    case Format::kNrrd:
-      return "NRRD";
-    case Format::kMeta:
-      return "MetaImage";
-    case Format::kTiff:
-      return "TIFF";
-    case Format::kPng:
-      return "PNG";
-    case Format::kDicom:
-      return "DICOM";
-  }
-  return "";
-}
-
 itk::ImageIOBase::Pointer image_io(Format format) {
   itk::Object::SetGlobalWarningDisplay(false);  // failures are values here, not talk on stderr
   switch (format) {
@@ -88,7 +70,7 @@ std::string one_line(const itk::ExceptionObject& e) {
 }
 
 Error unreadable(const std::filesystem::path& path, Format format, std::string why) {
-  return {ErrorKind::kBadInput, fmt::format("cannot be read as {}", name_of(format)), path.string(),
+  return {ErrorKind::kBadInput, fmt::format("cannot be read as {}", title(format)), path.string(),
           std::move(why), "the file must be complete and of the kind its suffix says"};
 }
 

@@ -24,6 +24,8 @@
 #include "base/atomic_file.h"
 #include "base/contract.h"
 #include "io/text/text_encoding.h"
+#include "io/text/text_file.h"
+#include "io/text/vtk_xml.h"
 
 namespace angiospline {
 namespace {
@@ -78,28 +80,6 @@ void add_mesh_arrays(vtkPointSet& set, const TriangleMesh& mesh,
     for (const double v : field.values) values->InsertNextValue(v);
     set.GetPointData()->AddArray(values);
   }
-}
-
-template <typename Writer, typename Data>
-Result<void> write_xml(const std::filesystem::path& path, Data& data) {
-  vtkNew<Writer> writer;
-  writer->SetInputData(&data);
-  writer->WriteToOutputStringOn();
-  writer->SetCompressorTypeToZLib();
-  writer->EncodeAppendedDataOff();
-  writer->SetHeaderTypeToUInt64();
-  if (writer->Write() == 0) {
-    return fail({ErrorKind::kCannotWrite, "VTK could not write the data", path.string(), {}, {}});
-  }
-  return write_file(path, writer->GetOutputString());
-}
-
-std::string lower_case_suffix(const std::filesystem::path& path) {
-  std::string suffix = path.extension().string();
-  for (char& c : suffix) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return suffix;
 }
 
 Error unreadable(const std::filesystem::path& path, std::string what, std::string rule) {
@@ -170,20 +150,24 @@ Result<void> write_vtk_mesh(const std::filesystem::path& path, const TriangleMes
                             const std::vector<MeshField>& fields) {
   EXPECTS(!find_defect(mesh));
   for (const MeshField& field : fields) EXPECTS(field.values.size() == mesh.points_mm.cols());
-  const std::string suffix = lower_case_suffix(path);
+  const std::string suffix = lower_case(path.extension().string());
   if (suffix == ".vtp") {
     vtkNew<vtkPolyData> data;
     data->SetPoints(vtk_points(mesh.points_mm));
     data->SetPolys(vtk_triangles(mesh.triangles));
     add_mesh_arrays(*data, mesh, fields);
-    return write_xml<vtkXMLPolyDataWriter>(path, *data);
+    vtkNew<vtkXMLPolyDataWriter> writer;
+    writer->SetInputData(data);
+    return write_vtk_xml(path, *writer);
   }
   if (suffix == ".vtu") {
     vtkNew<vtkUnstructuredGrid> data;
     data->SetPoints(vtk_points(mesh.points_mm));
     data->SetCells(VTK_TRIANGLE, vtk_triangles(mesh.triangles));
     add_mesh_arrays(*data, mesh, fields);
-    return write_xml<vtkXMLUnstructuredGridWriter>(path, *data);
+    vtkNew<vtkXMLUnstructuredGridWriter> writer;
+    writer->SetInputData(data);
+    return write_vtk_xml(path, *writer);
   }
   return fail({ErrorKind::kCannotWrite, "unknown suffix", path.string(), path.extension().string(),
                "surfaces go to .vtp or .vtu"});
@@ -192,7 +176,7 @@ Result<void> write_vtk_mesh(const std::filesystem::path& path, const TriangleMes
 Result<TriangleMesh> read_vtk_mesh(const std::filesystem::path& path) {
   if (const auto bytes = read_file(path); !bytes) return fail(bytes.error());
   TriangleMesh mesh;
-  if (lower_case_suffix(path) == ".vtu") {
+  if (lower_case(path.extension().string()) == ".vtu") {
     vtkNew<vtkXMLUnstructuredGridReader> reader;
     if (read_xml(*reader, path)) mesh = mesh_of(*reader->GetOutput());
   } else {
@@ -207,43 +191,6 @@ Result<TriangleMesh> read_vtk_mesh(const std::filesystem::path& path) {
     return fail(*error);
   }
   return mesh;
-}
-
-Result<void> write_vtk_centerlines(const std::filesystem::path& path, const CenterlineTree& tree) {
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  vtkNew<vtkCellArray> lines;
-  vtkNew<vtkDoubleArray> radius;
-  radius->SetName("MaximumInscribedSphereRadius");
-  vtkNew<vtkIntArray> id;
-  vtkNew<vtkIntArray> from;
-  vtkNew<vtkIntArray> to;
-  vtkNew<vtkStringArray> name;
-  id->SetName("BranchId");
-  from->SetName("FromNode");
-  to->SetName("ToNode");
-  name->SetName("Name");
-  for (std::size_t b = 0; b < tree.branches.size(); ++b) {
-    const CenterlineBranch& branch = tree.branches[b];
-    lines->InsertNextCell(static_cast<int>(branch.points_mm.cols()));
-    for (Eigen::Index k = 0; k < branch.points_mm.cols(); ++k) {
-      lines->InsertCellPoint(points->InsertNextPoint(branch.points_mm.col(k).data()));
-      radius->InsertNextValue(branch.radii_mm[k]);
-    }
-    id->InsertNextValue(static_cast<int>(b));
-    from->InsertNextValue(branch.from);
-    to->InsertNextValue(branch.to);
-    name->InsertNextValue(valid_utf8(branch.name));
-  }
-  vtkNew<vtkPolyData> data;
-  data->SetPoints(points);
-  data->SetLines(lines);
-  data->GetPointData()->AddArray(radius);
-  data->GetCellData()->AddArray(id);
-  data->GetCellData()->AddArray(from);
-  data->GetCellData()->AddArray(to);
-  data->GetCellData()->AddArray(name);
-  return write_xml<vtkXMLPolyDataWriter>(path, *data);
 }
 
 }  // namespace angiospline

@@ -1,5 +1,4 @@
-// VTK's XML files: surfaces (.vtp, .vtu) and centerlines (.vtp), with the arrays other programs
-// look for.
+// VTK's XML files of surfaces (.vtp, .vtu), with the arrays other programs look for.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +6,6 @@
 
 #include "base/result.h"
 #include "kernel/geometry/triangle_mesh.h"
-#include "modeling/tree/centerline_tree.h"
 
 namespace angiospline {
 
@@ -23,9 +21,5 @@ Result<void> write_vtk_mesh(const std::filesystem::path& path, const TriangleMes
 // ModelFaceID and FaceNames where present, else one part "surface". Points at one place are not
 // merged. Errors name the file: not readable, no triangles, not finite.
 Result<TriangleMesh> read_vtk_mesh(const std::filesystem::path& path);
-
-// Writes one polyline for each branch: point array MaximumInscribedSphereRadius; cell arrays
-// BranchId, FromNode, ToNode and Name. Each branch has its own points: radii at a node may differ.
-Result<void> write_vtk_centerlines(const std::filesystem::path& path, const CenterlineTree& tree);
 
 }  // namespace angiospline

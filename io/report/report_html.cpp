@@ -10,12 +10,14 @@
 
 #include "base/atomic_file.h"
 #include "base/contract.h"
+#include "base/index.h"
 #include "base/version.h"
 #include "io/meshes/palette.h"
 #include "io/meshes/part_arrays.h"
 #include "io/model/certificate_json.h"
 #include "io/report/report_page.h"
 #include "io/text/text_encoding.h"
+#include "modeling/analysis/morphometry.h"
 
 namespace angiospline {
 namespace {
@@ -43,32 +45,29 @@ double area_of(const TriangleMesh& mesh, const MeshMeasure& measured, const std:
 }
 
 Json branch_json(const CenterlineTree& tree, const CenterlineBranch& branch) {
+  // Long branches are thinned for the page; their last point stays.
   const Eigen::Index count = branch.points_mm.cols();
+  const Eigen::Index stride = std::max<Eigen::Index>(1, (count + kMostSamples - 1) / kMostSamples);
+  const Eigen::VectorXd s = arc_lengths_mm(branch);
   Json s_mm = Json::array();
   Json radius_mm = Json::array();
   Json points_mm = Json::array();
-  const Eigen::Index stride = std::max<Eigen::Index>(1, (count + kMostSamples - 1) / kMostSamples);
-  double s = 0;
-  double radius_integral = 0;
   for (Eigen::Index k = 0; k < count; ++k) {
-    if (k > 0) {
-      const double step = (branch.points_mm.col(k) - branch.points_mm.col(k - 1)).norm();
-      s += step;
-      radius_integral += 0.5 * step * (branch.radii_mm[k] + branch.radii_mm[k - 1]);
-    }
     if (k % stride != 0 && k + 1 != count) continue;
-    s_mm.push_back(rounded(s));
+    s_mm.push_back(rounded(s[k]));
     radius_mm.push_back(rounded(branch.radii_mm[k]));
     points_mm.push_back(vector_json(branch.points_mm.col(k)));
   }
-  const auto node = [&](int n) { return valid_utf8(tree.nodes[static_cast<std::size_t>(n)].name); };
+
+  const BranchMorphometry measured = morphometry(branch);
+  const auto node = [&](int n) { return valid_utf8(tree.nodes[index(n)].name); };
   return {{"name", valid_utf8(branch.name)},
           {"from", node(branch.from)},
           {"to", node(branch.to)},
-          {"length_mm", s},
-          {"mean_radius_mm", s > 0 ? radius_integral / s : branch.radii_mm.mean()},
-          {"min_radius_mm", branch.radii_mm.minCoeff()},
-          {"max_radius_mm", branch.radii_mm.maxCoeff()},
+          {"length_mm", measured.length_mm},
+          {"mean_radius_mm", measured.mean_radius_mm},
+          {"min_radius_mm", measured.min_radius_mm},
+          {"max_radius_mm", measured.max_radius_mm},
           {"s_mm", std::move(s_mm)},
           {"radius_mm", std::move(radius_mm)},
           {"points_mm", std::move(points_mm)}};
@@ -90,7 +89,7 @@ Json junctions_json(const CenterlineTree& tree, const TriangleMesh& mesh, const 
     if (at[n].size() < 3) continue;
     Json names = Json::array();
     for (const int b : at[n]) {
-      names.push_back(valid_utf8(tree.branches[static_cast<std::size_t>(b)].name));
+      names.push_back(valid_utf8(tree.branches[index(b)].name));
     }
     list.push_back({{"name", valid_utf8(tree.nodes[n].name)},
                     {"position_mm", vector_json(tree.nodes[n].position_mm)},
@@ -103,7 +102,7 @@ Json junctions_json(const CenterlineTree& tree, const TriangleMesh& mesh, const 
 
 Json faces_json(const TriangleMesh& mesh, const MeshMeasure& measured) {
   std::vector<int> triangles(mesh.parts.size(), 0);
-  for (const int part : mesh.part_of) ++triangles[static_cast<std::size_t>(part)];
+  for (const int part : mesh.part_of) ++triangles[index(part)];
   Json list = Json::array();
   for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
     list.push_back({{"name", valid_utf8(mesh.parts[p].name)},
@@ -142,6 +141,7 @@ Json facts_json(const Model& model, const TriangleMesh& mesh, const ReportExtras
   for (const FailedPart& part : model.failed) {
     failed.push_back({{"name", valid_utf8(part.name)}, {"why", valid_utf8(part.why)}});
   }
+
   Json seconds = Json::object();
   for (const auto& [stage, time] : extras.seconds) seconds[valid_utf8(stage)] = time;
   Json json{
@@ -170,24 +170,6 @@ Json facts_json(const Model& model, const TriangleMesh& mesh, const ReportExtras
       {"files", texts(extras.files)}};
   json["certificate"] = extras.certificate ? to_json(*extras.certificate) : Json();
   return json;
-}
-
-std::string base64(std::string_view bytes) {
-  static constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t three = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      three = three << 8U | (k < left ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
-      text += k <= left ? kDigits[three >> (18 - 6 * k) & 63U] : '=';
-    }
-  }
-  return text;
 }
 
 // Arrays one after the other, each from a multiple of four; add() says where it began.
@@ -228,71 +210,101 @@ std::uint16_t quantised(double value, double low, double extent) {
   return static_cast<std::uint16_t>(std::lround(65534 * std::clamp(t, 0.0, 1.0)));
 }
 
-// The geometry's table of contents for the page; the arrays go into `blob`.
-Json geometry_json(const TriangleMesh& mesh, const std::vector<MeshField>& fields, Blob& blob) {
-  const Vec3 low =
-      mesh.points_mm.cols() > 0 ? Vec3(mesh.points_mm.rowwise().minCoeff()) : Vec3::Zero();
-  const Vec3 high =
-      mesh.points_mm.cols() > 0 ? Vec3(mesh.points_mm.rowwise().maxCoeff()) : Vec3::Ones();
-  const Vec3 extent = high - low;
-  std::vector<ColourScale> scales;
-  Json fields_json = Json::array();
+// The colours of a scale from its lowest value to its highest, as CSS has them.
+Json colours_json(const ColourScale& scale) {
+  constexpr int kStops = 32;
+  Json colours = Json::array();
+  for (int k = 0; k <= kStops; ++k) {
+    const double t = static_cast<double>(k) / kStops;
+    colours.push_back(css(scale.diverging ? diverging_colour(t) : sequential_colour(t)));
+  }
+  return colours;
+}
+
+Json fields_json(const std::vector<MeshField>& fields) {
+  Json list = Json::array();
   for (const MeshField& field : fields) {
     const ColourScale scale = scale_of(field);
-    scales.push_back(scale);
-    Json colours = Json::array();
-    constexpr int kStops = 32;
-    for (int k = 0; k <= kStops; ++k) {
-      const double t = static_cast<double>(k) / kStops;
-      colours.push_back(css(scale.diverging ? diverging_colour(t) : sequential_colour(t)));
-    }
-    fields_json.push_back({{"name", valid_utf8(field.name)},
-                           {"low", scale.low},
-                           {"high", scale.high},
-                           {"colours", std::move(colours)}});
+    list.push_back({{"name", valid_utf8(field.name)},
+                    {"low", scale.low},
+                    {"high", scale.high},
+                    {"colours", colours_json(scale)}});
   }
-  Json parts_json = Json::array();
-  const std::vector<PartArrays> parts = arrays_of_parts(mesh);
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    const PartArrays& part = parts[p];
-    if (part.indices.empty()) continue;
-    std::vector<std::uint16_t> positions;
-    std::vector<std::int16_t> normals;
+  return list;
+}
+
+struct BoundingBox {
+  Vec3 low = Vec3::Zero();
+  Vec3 extent = Vec3::Ones();
+};
+
+BoundingBox bounding_box(const Points3& points_mm) {
+  if (points_mm.cols() == 0) return {};
+  const Vec3 low = points_mm.rowwise().minCoeff();
+  const Vec3 high = points_mm.rowwise().maxCoeff();
+  return {low, high - low};
+}
+
+// Points as 16 bits of the bounding box, four numbers each: attributes start at multiples of four
+// bytes.
+std::vector<std::uint16_t> quantised_points(const PartArrays& part, const Points3& points_mm,
+                                            const BoundingBox& box) {
+  std::vector<std::uint16_t> positions;
+  for (const int k : part.points) {
+    for (Eigen::Index d = 0; d < 3; ++d) {
+      const double t = box.extent[d] > 0 ? (points_mm(d, k) - box.low[d]) / box.extent[d] : 0.0;
+      positions.push_back(static_cast<std::uint16_t>(std::lround(65535 * t)));
+    }
+    positions.push_back(0);
+  }
+  return positions;
+}
+
+// A part's numbers of points and triangles, and where its arrays begin in `blob`.
+Json part_json(const PartArrays& part, std::size_t face, const Points3& points_mm,
+               const BoundingBox& box, const std::vector<MeshField>& fields, Blob& blob) {
+  std::vector<std::int16_t> normals;
+  for (const Vec3& n : part.normals) {
+    for (const std::int16_t x : octahedral(n)) normals.push_back(x);
+  }
+  Json json{{"face", face},
+            {"points", part.points.size()},
+            {"triangles", part.indices.size() / 3},
+            {"positions", blob.add(quantised_points(part, points_mm, box))},
+            {"normals", blob.add(normals)},
+            {"fields", Json::array()}};
+
+  // Half the bytes where 16 bits count all points.
+  const bool wide = part.points.size() > std::numeric_limits<std::uint16_t>::max();
+  json["indices"] =
+      wide ? blob.add(part.indices)
+           : blob.add(std::vector<std::uint16_t>(part.indices.begin(), part.indices.end()));
+
+  for (const MeshField& field : fields) {
+    const ColourScale scale = scale_of(field);
+    std::vector<std::uint16_t> values;
     for (const int k : part.points) {
-      for (Eigen::Index d = 0; d < 3; ++d) {
-        const double t = extent[d] > 0 ? (mesh.points_mm(d, k) - low[d]) / extent[d] : 0.0;
-        positions.push_back(static_cast<std::uint16_t>(std::lround(65535 * t)));
-      }
-      positions.push_back(0);  // attributes start at multiples of four bytes
+      values.push_back(quantised(field.values[k], scale.low, scale.high - scale.low));
+      values.push_back(0);
     }
-    for (const Vec3& n : part.normals) {
-      for (const std::int16_t x : octahedral(n)) normals.push_back(x);
-    }
-    Json json{{"face", p},
-              {"points", part.points.size()},
-              {"triangles", part.indices.size() / 3},
-              {"positions", blob.add(positions)},
-              {"normals", blob.add(normals)},
-              {"fields", Json::array()}};
-    const bool wide = part.points.size() > std::numeric_limits<std::uint16_t>::max();
-    json["indices"] =
-        wide ? blob.add(part.indices)
-             : blob.add(std::vector<std::uint16_t>(part.indices.begin(), part.indices.end()));
-    for (std::size_t f = 0; f < fields.size(); ++f) {
-      std::vector<std::uint16_t> values;
-      for (const int k : part.points) {
-        values.push_back(
-            quantised(fields[f].values[k], scales[f].low, scales[f].high - scales[f].low));
-        values.push_back(0);
-      }
-      json["fields"].push_back(blob.add(values));
-    }
-    parts_json.push_back(std::move(json));
+    json["fields"].push_back(blob.add(values));
   }
-  return {{"low_mm", {low.x(), low.y(), low.z()}},
-          {"extent_mm", {extent.x(), extent.y(), extent.z()}},
-          {"fields", std::move(fields_json)},
-          {"parts", std::move(parts_json)}};
+  return json;
+}
+
+// The geometry's table of contents for the page; the arrays go into `blob`.
+Json geometry_json(const TriangleMesh& mesh, const std::vector<MeshField>& fields, Blob& blob) {
+  const BoundingBox box = bounding_box(mesh.points_mm);
+  const std::vector<PartArrays> parts = arrays_of_parts(mesh);
+  Json list = Json::array();
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (parts[p].indices.empty()) continue;
+    list.push_back(part_json(parts[p], p, mesh.points_mm, box, fields, blob));
+  }
+  return {{"low_mm", {box.low.x(), box.low.y(), box.low.z()}},
+          {"extent_mm", {box.extent.x(), box.extent.y(), box.extent.z()}},
+          {"fields", fields_json(fields)},
+          {"parts", std::move(list)}};
 }
 
 Json image_json(const ReportImage& image) {
@@ -355,6 +367,7 @@ std::string report_html(const Model& model, const TriangleMesh& mesh, const Repo
   facts["geometry"] = geometry_json(mesh, extras.fields, blob);
   facts["images"] = Json::array();
   for (const ReportImage& image : extras.images) facts["images"].push_back(image_json(image));
+
   std::string page(report_page());
   // From the back: what is filled in is never searched for marks.
   replace_mark(page, "%MESH%", base64(blob.bytes()));

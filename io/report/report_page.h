@@ -5,7 +5,8 @@
 
 namespace angiospline {
 
-// The text of io/report/report_page.html, with the marks %FACTS% and %MESH% still in it.
+// page.html with style.css and the scripts (tables.js, plots.js, viewer.js, projections.js) in it,
+// as CMake bundles them: one page that loads nothing. The marks %FACTS% and %MESH% are still in it.
 std::string_view report_page();
 
 }  // namespace angiospline

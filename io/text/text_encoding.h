@@ -1,6 +1,7 @@
 // Text for formats that insist on an encoding.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -13,5 +14,12 @@ std::string valid_utf8(std::string_view text);
 // '_', '-' and '.' are kept, anything else becomes '_'; never empty, never starting with a digit,
 // '-' or '.'.
 std::string word(std::string_view text);
+
+// Bytes as text (RFC 4648, section 4): four digits for three bytes, padded with `=`, no line ends.
+std::string base64(std::string_view bytes);
+
+// The bytes from the front of `text`, blanks skipped; padding ends a group and the next goes on, as
+// VTK writes header and data. Stops at the first other character or when `most` bytes are there.
+std::string base64_decoded(std::string_view text, std::size_t most);
 
 }  // namespace angiospline

@@ -138,6 +138,13 @@ void split_fields(std::string_view line, char separator, std::vector<std::string
   }
 }
 
+char separator_of(std::string_view line) {
+  for (const char c : {';', '\t', ','}) {
+    if (line.find(c) != std::string_view::npos) return c;
+  }
+  return ' ';
+}
+
 std::optional<double> parse_number(std::string_view text) {
   text = without_plus(text);
   double value = 0;

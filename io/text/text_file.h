@@ -52,6 +52,10 @@ std::string lower_case(std::string_view text);          // ASCII only
 // loop.
 void split_fields(std::string_view line, char separator, std::vector<std::string_view>& fields);
 
+// What separates the columns of a table, by one of its lines: the first of `;`, tab and `,` that
+// stands in it, else ' '.
+char separator_of(std::string_view line);
+
 // A finite number, written with a decimal point whatever the locale; the whole text must be used.
 std::optional<double> parse_number(std::string_view text);
 

@@ -14,6 +14,11 @@ namespace angiospline {
 // Elements, attributes, text, CDATA, comments, processing instructions, the five named entities and
 // numeric ones. A document type is skipped; one that defines entities is refused, so that nothing
 // grows beyond the file. The text stays the caller's and must outlive the reader. O(length) in all.
+//
+// Why not pugixml: where a VTP file's appended data are raw, what follows is no XML; this reader
+// stops there, a parser of whole documents fails. pugixml takes unknown entities, and document
+// types that define some, without a word; here they are errors with their line. Expat refuses a
+// second root element, which SimVascular's files have.
 class XmlReader {
  public:
   enum class Event { kStart, kEnd, kText, kDone };

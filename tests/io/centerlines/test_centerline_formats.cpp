@@ -13,7 +13,7 @@
 #include "io/centerlines/swc_file.h"
 #include "io/centerlines/tree_definition.h"
 #include "io/centerlines/vtk_centerline.h"
-#include "io/centerlines/vtk_polylines.h"
+#include "io/reading/vtk_polylines.h"
 #include "io/text/xml_reader.h"
 #include "tests/shapes/paths.h"
 

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "io/centerlines/vtp_writer.h"
 #include "io/export/export_model.h"
 #include "io/meshes/glb_file.h"
 #include "io/meshes/palette.h"

@@ -1,76 +1,35 @@
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cstring>
 #include <limits>
 
 #include <fmt/format.h>
 
-#include "io/centerlines/vtk_polylines.h"
+#include "io/reading/vtk_numbers.h"
+#include "io/reading/vtk_polylines.h"
 #include "io/text/text_file.h"
 
 namespace angiospline {
 namespace {
 
-enum class Kind { kFloat, kDouble, kChar, kUChar, kShort, kUShort, kInt, kUInt, kLong, kULong };
-
-struct KindName {
+struct TypeName {
   std::string_view name;
-  Kind kind;
-  std::size_t bytes;
+  VtkNumber type;
 };
 
-constexpr std::array kKinds = {KindName{"float", Kind::kFloat, 4},
-                               KindName{"double", Kind::kDouble, 8},
-                               KindName{"char", Kind::kChar, 1},
-                               KindName{"signed_char", Kind::kChar, 1},
-                               KindName{"unsigned_char", Kind::kUChar, 1},
-                               KindName{"short", Kind::kShort, 2},
-                               KindName{"unsigned_short", Kind::kUShort, 2},
-                               KindName{"int", Kind::kInt, 4},
-                               KindName{"unsigned_int", Kind::kUInt, 4},
-                               KindName{"long", Kind::kLong, 8},
-                               KindName{"unsigned_long", Kind::kULong, 8},
-                               KindName{"vtktypeint64", Kind::kLong, 8},
-                               KindName{"vtktypeint32", Kind::kInt, 4},
-                               KindName{"vtkidtype", Kind::kInt, 4}};
-
-template <typename T>
-double big_endian(const char* p) {
-  std::array<char, sizeof(T)> raw{};
-  std::memcpy(raw.data(), p, sizeof(T));
-  if constexpr (std::endian::native == std::endian::little) std::reverse(raw.begin(), raw.end());
-  T value;
-  std::memcpy(&value, raw.data(), sizeof(T));
-  return static_cast<double>(value);
-}
-
-// Indices below 2^53 pass through a double unchanged; larger ones are out of range anyway.
-double number_at(const char* p, Kind kind) {
-  switch (kind) {
-    case Kind::kFloat:
-      return big_endian<float>(p);
-    case Kind::kDouble:
-      return big_endian<double>(p);
-    case Kind::kChar:
-      return big_endian<signed char>(p);
-    case Kind::kUChar:
-      return big_endian<unsigned char>(p);
-    case Kind::kShort:
-      return big_endian<short>(p);
-    case Kind::kUShort:
-      return big_endian<unsigned short>(p);
-    case Kind::kInt:
-      return big_endian<int>(p);
-    case Kind::kUInt:
-      return big_endian<unsigned>(p);
-    case Kind::kLong:
-      return big_endian<long long>(p);
-    case Kind::kULong:
-      return big_endian<unsigned long long>(p);
-  }
-  return 0.0;
-}
+constexpr std::array kTypes = {TypeName{"float", VtkNumber::kFloat32},
+                               TypeName{"double", VtkNumber::kFloat64},
+                               TypeName{"char", VtkNumber::kInt8},
+                               TypeName{"signed_char", VtkNumber::kInt8},
+                               TypeName{"unsigned_char", VtkNumber::kUInt8},
+                               TypeName{"short", VtkNumber::kInt16},
+                               TypeName{"unsigned_short", VtkNumber::kUInt16},
+                               TypeName{"int", VtkNumber::kInt32},
+                               TypeName{"unsigned_int", VtkNumber::kUInt32},
+                               TypeName{"long", VtkNumber::kInt64},
+                               TypeName{"unsigned_long", VtkNumber::kUInt64},
+                               TypeName{"vtktypeint64", VtkNumber::kInt64},
+                               TypeName{"vtktypeint32", VtkNumber::kInt32},
+                               TypeName{"vtkidtype", VtkNumber::kInt32}};
 
 class LegacyReader {
  public:
@@ -134,27 +93,30 @@ class LegacyReader {
     return static_cast<std::size_t>(*number);
   }
 
-  Result<KindName> kind(std::string_view text) const {
+  Result<VtkNumber> number_type(std::string_view text) const {
     const std::string lower = lower_case(text);
-    const auto found = std::find_if(kKinds.begin(), kKinds.end(),
-                                    [&](const KindName& k) { return k.name == lower; });
-    if (found == kKinds.end()) return bad("the type is not known", text, "a numeric type of VTK");
-    return *found;
+    const auto* const found = std::find_if(kTypes.begin(), kTypes.end(),
+                                           [&](const TypeName& t) { return t.name == lower; });
+    if (found == kTypes.end()) return bad("the type is not known", text, "a numeric type of VTK");
+    return found->type;
   }
 
-  Result<std::vector<double>> numbers(std::size_t wanted, const KindName& type) {
+  // Indices below 2^53 pass through a double unchanged; larger ones are out of range anyway.
+  Result<std::vector<double>> numbers(std::size_t wanted, VtkNumber type) {
     std::vector<double> out;
     if (binary_) {
       skip_line();  // the data begin behind the line's end
-      if (at_ > bytes_.size() || wanted > (bytes_.size() - at_) / type.bytes) {
+      const std::size_t size = bytes_of(type);
+      if (at_ > bytes_.size() || wanted > (bytes_.size() - at_) / size) {
         return bad("the data are cut short", {}, fmt::format("{} numbers are needed", wanted));
       }
       out.reserve(wanted);
-      for (std::size_t i = 0; i < wanted; ++i, at_ += type.bytes) {
-        out.push_back(number_at(bytes_.data() + at_, type.kind));
+      for (std::size_t i = 0; i < wanted; ++i, at_ += size) {
+        out.push_back(number_at<double>(bytes_.data() + at_, type, ByteOrder::kBigEndian));
       }
       return out;
     }
+
     if (wanted > bytes_.size() - at_) {
       return bad("the data are cut short", {}, fmt::format("{} numbers are needed", wanted));
     }
@@ -201,7 +163,7 @@ class LegacyReader {
       word();
       const auto entries = count(4);
       if (!entries) return fail(entries.error());
-      auto skipped = numbers(4 * *entries, {"unsigned_char", Kind::kUChar, 1});
+      auto skipped = numbers(4 * *entries, VtkNumber::kUInt8);
       return skipped ? Result<void>{} : fail(skipped.error());
     }
     return bad("the section is not known", keyword,
@@ -211,7 +173,7 @@ class LegacyReader {
   Result<void> points() {
     const auto number = count(3);
     if (!number) return fail(number.error());
-    const auto type = kind(word());
+    const auto type = number_type(word());
     if (!type) return fail(type.error());
     auto found = numbers(3 * *number, *type);
     if (!found) return fail(found.error());
@@ -227,9 +189,11 @@ class LegacyReader {
     const std::size_t before = at_;
     if (lower_case(word()) == "offsets") return new_cells(*number, *size, wanted);
     at_ = before;
-    const auto found = numbers(*size, {"int", Kind::kInt, 4});
+    const auto found = numbers(*size, VtkNumber::kInt32);
     if (!found) return fail(found.error());
     if (!wanted) return {};
+
+    // Each line's number of points stands before its indices.
     std::size_t i = 0;
     for (std::size_t line = 0; line < *number; ++line) {
       const double length = i < found->size() ? (*found)[i] : -1.0;
@@ -248,17 +212,18 @@ class LegacyReader {
 
   // Files of version 5: offsets (one more than lines), then connectivity.
   Result<void> new_cells(std::size_t offset_count, std::size_t index_count, bool wanted) {
-    const auto offset_type = kind(word());
+    const auto offset_type = number_type(word());
     if (!offset_type) return fail(offset_type.error());
     const auto offsets = numbers(offset_count, *offset_type);
     if (!offsets) return fail(offsets.error());
     if (lower_case(word()) != "connectivity")
       return bad("the connectivity is missing", {}, "it follows the offsets");
-    const auto index_type = kind(word());
+    const auto index_type = number_type(word());
     if (!index_type) return fail(index_type.error());
     const auto indices = numbers(index_count, *index_type);
     if (!indices) return fail(indices.error());
     if (!wanted) return {};
+
     const auto first = static_cast<long long>(lines_.indices.size());
     double before = 0;
     for (std::size_t k = 1; k < offsets->size(); ++k) {
@@ -294,7 +259,7 @@ class LegacyReader {
 
   Result<void> scalars() {
     const std::string_view array_name = word();
-    const auto type = kind(word());
+    const auto type = number_type(word());
     if (!type) return fail(type.error());
     std::size_t components = 1;
     const std::size_t before = at_;
@@ -316,7 +281,7 @@ class LegacyReader {
   }
 
   Result<void> skip_numbers(std::size_t components) {
-    const auto type = kind(word());
+    const auto type = number_type(word());
     if (!type) return fail(type.error());
     auto skipped = numbers(components * tuples_, *type);
     return skipped ? Result<void>{} : fail(skipped.error());
@@ -342,7 +307,7 @@ class LegacyReader {
         for (std::size_t i = 0; i <= *tuples; ++i) skip_line();
         continue;
       }
-      const auto type = kind(type_word);
+      const auto type = number_type(type_word);
       if (!type) return fail(type.error());
       if (*components > 0 && *tuples > bytes_.size() / *components) {
         return bad("the count cannot be true", array_name, "the file is too small for it");

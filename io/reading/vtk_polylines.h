@@ -22,6 +22,11 @@ struct VtkPolylines {
 // XML polydata (.vtp) and legacy polydata (.vtk). Memory is bounded by a multiple of the file's
 // size (zlib's largest ratio, where data are compressed). Errors name file, line or array, value
 // and rule.
+//
+// VTK's own readers are not used here: they ask for memory by what a file claims (82 bytes that
+// claim four billion points make vtkPolyDataReader of VTK 9.1 ask for 48 GB, and its error code
+// then says that all is well), they write what is wrong to the error stream, and they name neither
+// line nor value.
 Result<VtkPolylines> parse_vtp(std::string_view bytes, std::string_view name);
 Result<VtkPolylines> parse_legacy_vtk(std::string_view bytes, std::string_view name);
 
