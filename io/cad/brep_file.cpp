@@ -32,6 +32,8 @@ Result<void> write_unchecked(const Solid& solid, const std::filesystem::path& pa
     BRepTools::Write(solid.shape->shape, file, false, false, TopTools_FormatVersion_VERSION_1,
                      indicator->Start());
     if (progress.should_stop()) return fail(cancelled("write BREP"));
+
+    // Behind the shape, where OpenCASCADE stops reading, stand the names and colours.
     file << '\n' << kFacesHeading << ' ' << solid.faces.size() << '\n';
     file.precision(17);
     for (const SolidFace& face : solid.faces) {
@@ -62,6 +64,7 @@ std::vector<SolidFace> read_faces(std::istream& in, std::size_t count) {
   const std::string heading = kFacesHeading + (' ' + std::to_string(count));
   while (std::getline(in, line) && line != heading) {
   }
+
   while (faces.size() < count && std::getline(in, line)) {
     std::istringstream words(line);
     words.imbue(std::locale::classic());

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "io/cad/rules.h"
 
 namespace angiospline {
 namespace {
@@ -36,6 +37,8 @@ Result<void> write_gmsh_script(const Solid& solid, const std::filesystem::path& 
       smallest = face.radius_mm;
     }
   }
+
+  // The script finds the model from its own folder, wherever both are moved together.
   const std::filesystem::path model =
       cad_file.lexically_proximate(script.parent_path().empty() ? "." : script.parent_path());
   std::string text = fmt::format(
@@ -44,17 +47,20 @@ Result<void> write_gmsh_script(const Solid& solid, const std::filesystem::path& 
       "SetFactory(\"OpenCASCADE\");\n"
       "Merge {2};\n\n",
       model.filename().string(), script.filename().string(), quoted(model.generic_string()));
+
   for (std::size_t n = 0; n < names.size(); ++n) {
     text += fmt::format("Physical Surface({}, {}) = {{{}}};\n", quoted(names[n]), n + 1,
                         fmt::join(tags[names[n]], ", "));
   }
   text += fmt::format("Physical Volume(\"lumen\", {}) = Volume{{:}};\n\n", names.size() + 1);
-  text +=
+
+  text += fmt::format(
       "// Twelve elements around a vessel; raise this number for a finer mesh.\n"
-      "Mesh.MeshSizeFromCurvature = 12;\n";
-  // No smaller than around the thinnest vessel: sharp crotches would ask for dust.
+      "Mesh.MeshSizeFromCurvature = {};\n",
+      kGmshElementsAround);
   if (smallest > 0) {
-    text += fmt::format("Mesh.MeshSizeMin = {:.6g};\n", 2 * std::numbers::pi * smallest / 16);
+    text += fmt::format("Mesh.MeshSizeMin = {:.6g};\n",
+                        2 * std::numbers::pi * smallest / kGmshMostElementsAround);
   }
   return write_file(script, text);
 }

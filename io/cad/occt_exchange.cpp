@@ -36,6 +36,7 @@
 #include <XSAlgo.hxx>
 
 #include "base/atomic_file.h"
+#include "io/cad/rules.h"
 #include "modeling/solid/solid_shape.h"
 
 namespace angiospline {
@@ -68,6 +69,7 @@ void collect_notes(const TDF_Label& label, XCAFDoc_ColorTool& colours, FaceNotes
   if (is_face && label.FindAttribute(TDataStd_Name::GetID(), name)) {
     note.name = plain(name->Get());
   }
+
   Quantity_Color colour;
   if (colours.GetColor(label, XCAFDoc_ColorSurf, colour) ||
       colours.GetColor(label, XCAFDoc_ColorGen, colour)) {
@@ -75,6 +77,7 @@ void collect_notes(const TDF_Label& label, XCAFDoc_ColorTool& colours, FaceNotes
     colour.Values(r, g, b, Quantity_TOC_sRGB);
     note.colour = Vec3(r, g, b);
   }
+
   if (!note.name && !note.colour) return;
   for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {
     FaceNote& kept = notes[at.Current().TShape().get()];
@@ -104,9 +107,7 @@ int count(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
   return n;
 }
 
-// Even steps of a surface's domain at which it is compared.
-constexpr int kSteps = 6;
-static_assert((kSteps + 1) * (kSteps + 1) == kDigestSamples);
+static_assert((kDigestSteps + 1) * (kDigestSteps + 1) == kDigestSamples);
 
 // The surface at even fractions of its domain; nothing for a plane, whose domain is endless.
 std::vector<Vec3> samples_of(const Geom_Surface& surface) {
@@ -115,9 +116,10 @@ std::vector<Vec3> samples_of(const Geom_Surface& surface) {
   if (Precision::IsInfinite(u0)) return {};
   std::vector<Vec3> samples;
   samples.reserve(kDigestSamples);
-  for (int i = 0; i <= kSteps; ++i) {
-    for (int j = 0; j <= kSteps; ++j) {
-      const gp_Pnt p = surface.Value(u0 + (u1 - u0) * i / kSteps, v0 + (v1 - v0) * j / kSteps);
+  for (int i = 0; i <= kDigestSteps; ++i) {
+    for (int j = 0; j <= kDigestSteps; ++j) {
+      const gp_Pnt p =
+          surface.Value(u0 + (u1 - u0) * i / kDigestSteps, v0 + (v1 - v0) * j / kDigestSteps);
       samples.emplace_back(p.X(), p.Y(), p.Z());
     }
   }
@@ -269,6 +271,7 @@ SolidDigest digest_of(const Solid& solid) {
   SolidDigest digest;
   digest.solids = count(shape, TopAbs_SOLID);
   digest.shells = count(shape, TopAbs_SHELL);
+
   Bnd_Box box;
   BRepBndLib::AddClose(shape, box);
   digest.size_mm = std::sqrt(box.SquareExtent());
@@ -295,6 +298,8 @@ Result<void> write_verified(
       if (done.error().kind == ErrorKind::kCancelled) return done;
       return cannot_write(path, done.error().what);  // the user knows nothing of the temporary file
     }
+
+    // A writer that reports success proves nothing: only what comes back does.
     const Result<Solid> back = read(temporary);
     if (!back) {
       if (back.error().kind == ErrorKind::kCancelled) return fail(back.error());
@@ -334,7 +339,7 @@ Result<void> expect_same(const SolidDigest& written, const Solid& read,
     }
     const auto distance = surface_distance(
         face.samples_mm, samples_of(*BRep_Tool::Surface(TopoDS::Face(at.Current()))));
-    if (distance && !(*distance <= 1e-9 * written.size_mm)) {
+    if (distance && !(*distance <= kDigestTolerance * written.size_mm)) {
       return differs(path, "surface moved: " + face.name, std::to_string(*distance) + " mm", rule);
     }
   }

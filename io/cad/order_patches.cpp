@@ -20,6 +20,7 @@ class RegionForest {
     for (std::size_t p = 0; p < network.patches.size(); ++p) {
       patches_[index(network.patches[p].region)].push_back(static_cast<int>(p));
     }
+
     for (const Join& join : network.joins) {
       const int a = network.patches[index(join.a.patch)].region;
       const int b = network.patches[index(join.b.patch)].region;
@@ -57,6 +58,8 @@ class RegionForest {
     std::sort(starts.begin(), starts.end(), [&](int a, int b) {
       return patches_[index(a)].front() < patches_[index(b)].front();
     });
+
+    // Depth first, so that a region stands near the one it was reached from.
     std::vector<bool> is_met(patches_.size(), false);
     std::vector<int> met;
     std::vector<std::pair<int, int>> ahead;  // region and where it is come to from
@@ -75,6 +78,8 @@ class RegionForest {
         }
       }
     }
+
+    // Children before parents: each adds what hangs on it to its parent.
     std::vector<std::size_t> sizes(patches_.size());
     for (std::size_t r = 0; r < sizes.size(); ++r) sizes[r] = patches_[r].size();
     std::for_each(met.rbegin(), met.rend(), [&](int region) {
@@ -83,6 +88,8 @@ class RegionForest {
       sizes[index(parent)] += sizes[index(region)];
       children_[index(parent)].push_back(region);
     });
+
+    // Small subtrees first: the way to a neighbour then jumps over small branches only.
     for (std::vector<int>& children : children_) {
       std::sort(children.begin(), children.end(), [&](int a, int b) {
         return std::pair(sizes[index(a)], a) < std::pair(sizes[index(b)], b);
@@ -109,12 +116,15 @@ SurfaceNetwork order_by_neighbours(SurfaceNetwork network) {
     patches.push_back(std::move(network.patches[index(p)]));
   }
   network.patches = std::move(patches);
+
   const auto move = [&](Side& side) { side.patch = place[index(side.patch)]; };
   for (Join& join : network.joins) {
     move(join.a);
     move(join.b);
   }
   for (Rim& rim : network.rims) std::for_each(rim.sides.begin(), rim.sides.end(), move);
+
+  // Rims follow the patches they lie on.
   const auto first_patch = [](const Rim& rim) {
     int first = rim.sides.empty() ? -1 : rim.sides.front().patch;
     for (const Side& side : rim.sides) first = std::min(first, side.patch);

@@ -8,12 +8,10 @@
 
 #include "base/contract.h"
 #include "base/index.h"
+#include "io/cad/rules.h"
 
 namespace angiospline {
 namespace {
-
-constexpr int kSamplesPerSpan = 8;
-constexpr double kSlack = 1e-6;  // pieces; rounding does not add one
 
 const KnotVector& knots_along(const Patch& patch, PatchSide side) {
   return side == PatchSide::kU0 || side == PatchSide::kU1 ? patch.v : patch.u;
@@ -62,7 +60,7 @@ class Splitter {
   std::vector<double> cuts(const Side& a, const Join* join) const {
     const std::vector<double> measure = measure_along(a, join);
     const double total = measure.back();
-    const int pieces = std::max(1, static_cast<int>(std::ceil(total - kSlack)));
+    const int pieces = std::max(1, static_cast<int>(std::ceil(total - kPieceSlack)));
     std::vector<double> fractions;
     std::size_t k = 0;
     for (int i = 1; i < pieces; ++i) {
@@ -79,8 +77,9 @@ class Splitter {
   std::vector<double> measure_along(const Side& a, const Join* join) const {
     const Patch& patch = network_.patches[index(a.patch)];
     const int samples =
-        kSamplesPerSpan * static_cast<int>(knots_along(patch, a.side).breakpoints().size());
+        kSideSamplesPerSpan * static_cast<int>(knots_along(patch, a.side).breakpoints().size());
     std::vector<double> measure{0.0};
+
     Vec3 last = point_on(a, a.side, a.from);
     Vec3 last_step = Vec3::Zero();
     for (int k = 1; k <= samples; ++k) {
@@ -92,6 +91,8 @@ class Splitter {
       if (join != nullptr) {
         width = std::min(width, width_at(join->b, join_parameter_b(*join, s), place));
       }
+
+      // A piece is used up by its length in widths or by its turn, whichever is more.
       const double turn = std::atan2(last_step.cross(step).norm(), last_step.dot(step));
       const double by_length = width > 0 ? step.norm() / (options_.widths * width) : 0.0;
       const double by_turn = turn * 180 / std::numbers::pi / options_.turn_deg;
@@ -152,6 +153,8 @@ SurfaceNetwork split_joins(SurfaceNetwork network, const SplitOptions& options) 
   for (const Join& join : network.joins) {
     append_pieces(join, splitter.cuts(join.a, &join), joins);
   }
+
+  // Rims keep their order round the hole, whatever direction their sides run in.
   std::vector<std::vector<Side>> rims;
   for (const Rim& rim : network.rims) {
     std::vector<Side>& sides = rims.emplace_back();
@@ -163,6 +166,7 @@ SurfaceNetwork split_joins(SurfaceNetwork network, const SplitOptions& options) 
       sides.insert(sides.end(), pieces.begin(), pieces.end());
     }
   }
+
   network.joins = std::move(joins);
   for (std::size_t r = 0; r < rims.size(); ++r) network.rims[r].sides = std::move(rims[r]);
   return network;

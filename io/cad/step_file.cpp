@@ -179,6 +179,7 @@ Result<Handle(StepData_StepModel)> entities_of(const Solid& solid,
   STEPControl_Controller::Init();
   set_write_options(
       options);  // before the writer makes its model, which takes the schema from them
+
   STEPControl_Writer writer;
   const Handle(ExchangeProgress) indicator = new ExchangeProgress(progress, "write STEP");
   const IFSelect_ReturnStatus done =
@@ -187,6 +188,7 @@ Result<Handle(StepData_StepModel)> entities_of(const Solid& solid,
   if (done != IFSelect_RetDone) {
     return cannot_write(path, "OpenCASCADE could not convert the solid to STEP");
   }
+
   set_names_and_colours(writer, solid, options.product);
   const auto model = Handle(StepData_StepModel)::DownCast(writer.WS()->Model());
   set_header(model, options);

@@ -63,6 +63,8 @@ SurfaceNetwork turn_long_patches(SurfaceNetwork network) {
     const Patch& patch = network.patches[index(side.patch)];
     return is_long(patch) && turn(side, patch.u);
   };
+
+  // A join is reversed anew where only one of its sides runs the other way now.
   for (Join& join : network.joins) {
     const bool a = turned(join.a), b = turned(join.b);
     if (a != b) join.reversed = !join.reversed;

@@ -88,6 +88,7 @@ Result<CenterlineTree> read_folder(const std::filesystem::path& path,
     if (file.find("edge") != std::string::npos && file.ends_with(".csv"))
       edges.push_back(entry.path());
   }
+
   std::sort(simvascular.begin(), simvascular.end());
   if (edges.size() == 1 && simvascular.empty()) {
     if (const auto vertices = partner_of(edges[0], kEdgeWords, kVertexWords)) {
@@ -125,6 +126,8 @@ Result<std::vector<std::filesystem::path>> centerline_files_in(
   if (code) {
     return fail({ErrorKind::kBadInput, "the folder cannot be read", folder.string(), {}, {}});
   }
+
+  // Of a pair of tables the vertices stand for both.
   std::vector<std::filesystem::path> trees;
   if (holds_simvascular(folder)) trees.push_back(folder);
   for (const auto& entry : entries) {
@@ -152,6 +155,7 @@ std::vector<std::filesystem::path> files_of_tree(const std::filesystem::path& pa
       if (is_part) files.push_back(entry.path());
     }
   }
+
   if (const auto edges = partner_of(path, kVertexWords, kEdgeWords)) files.push_back(*edges);
   if (const auto vertices = partner_of(path, kEdgeWords, kVertexWords)) files.push_back(*vertices);
   std::sort(files.begin(), files.end());
@@ -171,8 +175,11 @@ Result<CenterlineTree> read_centerline_file(const std::filesystem::path& path,
     return fail({ErrorKind::kBadInput, "not a known format of centerlines", path.string(),
                  fmt::format("'{}'", suffix), "the suffix is one of " + known});
   }
+
   const Result<std::string> text = format->is_text ? read_text_file(path) : read_bytes(path);
   if (!text) return fail(text.error());
+
+  // A table of vertices or edges looks like a table of points by its suffix only.
   if (suffix == ".csv") {
     const bool vertices = is_vertex_table(*text);
     if (vertices || is_edge_table(*text)) {
@@ -187,6 +194,7 @@ Result<CenterlineTree> read_centerline_file(const std::filesystem::path& path,
                    "vertices.csv and edges.csv stand beside each other"});
     }
   }
+
   Result<CenterlineTree> tree = format->parse(*text, path.string(), options);
   if (tree && options.voxel_width && format->parse != parse_gxl) {
     tree->assumptions.emplace_back(

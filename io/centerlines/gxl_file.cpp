@@ -5,14 +5,13 @@
 
 #include <fmt/format.h>
 
+#include "io/centerlines/rules.h"
 #include "io/reading/graph_builder.h"
 #include "io/text/text_file.h"
 #include "io/text/xml_reader.h"
 
 namespace angiospline {
 namespace {
-
-constexpr double kVascuSynthVoxelWidth = 0.04;
 
 // VascuSynth writes blanks into its attributes: name=" position".
 std::string_view attribute(const XmlReader& xml, std::string_view name) {

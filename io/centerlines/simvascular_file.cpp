@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "io/centerlines/rules.h"
 #include "io/reading/finish_tree.h"
 #include "io/text/text_file.h"
 #include "io/text/xml_reader.h"
@@ -15,9 +16,6 @@
 
 namespace angiospline {
 namespace {
-
-// SimVascular models in centimetres; its files do not say so.
-constexpr double kUnitMm = 10.0;
 
 class SimVascularReader {
  public:
@@ -74,6 +72,7 @@ class SimVascularReader {
       if (!p) return fail(p.error());
       points.push_back(*p);
     }
+
     if (points.size() < 2) {
       return fail({ErrorKind::kBadInput, "is not a SimVascular path", std::string(name_),
                    fmt::format("{} path points", points.size()), "a path has at least two"});
@@ -261,7 +260,7 @@ Result<CenterlineLine> read_vessel(const VesselFiles& files) {
 
 FileFacts facts_of(const MergedLines& merged, std::size_t vessels, bool with_paths) {
   FileFacts facts;
-  facts.unit_mm = kUnitMm;
+  facts.unit_mm = kSimVascularUnitMm;
   facts.unit_name = "cm, SimVascular's habit";
   facts.notes.push_back(fmt::format(
       "{} vessels: radii are those of circles of the contours' areas, points {}", vessels,

@@ -11,16 +11,12 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
+#include "io/centerlines/rules.h"
 #include "io/reading/finish_tree.h"
 #include "io/text/text_file.h"
 
 namespace angiospline {
 namespace {
-
-// Samples along a curved branch lie this far apart, in radii, and are no more than so many in a
-// piece: a hair of a thousand radii between two points is sampled more coarsely.
-constexpr double kSampleRadii = 0.5;
-constexpr int kMostSamples = 64;
 
 struct PathPoint {
   Vec3 position;
@@ -257,8 +253,9 @@ class DefinitionReader {
           i + 2 < path.size() ? path[i + 2].position : Vec3(2 * q - p)};
       const double length = (q - p).norm();
       const double radius = std::min(*path[i].radius, *path[i + 1].radius);
-      const int samples = static_cast<int>(std::clamp(std::ceil(length / (kSampleRadii * radius)),
-                                                      1.0, static_cast<double>(kMostSamples)));
+      const int samples =
+          static_cast<int>(std::clamp(std::ceil(length / (kDefinitionSampleRadii * radius)), 1.0,
+                                      static_cast<double>(kDefinitionMostSamples)));
 
       for (int k = 1; k <= samples; ++k) {
         const double u = static_cast<double>(k) / samples;

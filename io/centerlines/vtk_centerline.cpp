@@ -57,6 +57,7 @@ class LinesToTree {
         return {};
       }
     }
+
     std::string known;
     for (const auto& [array_name, values] : lines_.scalars) {
       known += (known.empty() ? "" : ", ") + array_name;
@@ -113,6 +114,8 @@ class LinesToTree {
         before = here;
       }
     }
+
+    // As VMTK writes them, the first line begins at the inlet.
     graph.roots.push_back(0);
     facts_.notes.push_back("lines: joined at the points they share");
     return graph;

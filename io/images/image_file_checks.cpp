@@ -21,12 +21,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-tl::unexpected<Error> bad(const fs::path& path, std::string what, std::string value,
-                          std::string rule) {
-  return fail(
-      {ErrorKind::kBadInput, std::move(what), path.string(), std::move(value), std::move(rule)});
-}
-
 // ---- NIfTI ------------------------------------------------------------------------------------
 
 // Plain and gzipped files alike: zlib passes plain bytes through.
@@ -79,6 +73,8 @@ std::optional<NiftiHeader> parse_nifti(const std::vector<unsigned char>& b) {
       h.sform = number_at<std::int16_t>(b, 254, swapped);
       return h;
     }
+
+    // NIfTI-2, which has room for larger numbers.
     if (b.size() >= 540 && number_at<std::int32_t>(b, 0, swapped) == 540) {
       for (std::size_t i = 0; i < 8; ++i) {
         h.dim[i] = number_at<std::int64_t>(b, 16 + 8 * i, swapped);
@@ -114,6 +110,7 @@ Result<unsigned long long> unpacked_size(const fs::path& path, unsigned long lon
   if (number_at<std::uint32_t>(tail, 0, std::endian::native == std::endian::big) ==
       static_cast<std::uint32_t>(expected))
     return expected;
+
   const GzFile gz(gzopen(path.c_str(), "rb"));
   std::vector<char> buffer(1 << 20);
   unsigned long long total = 0;
@@ -122,10 +119,6 @@ Result<unsigned long long> unpacked_size(const fs::path& path, unsigned long lon
     total += static_cast<unsigned long long>(got);
   return total;
 }
-
-}  // namespace
-
-namespace {
 
 std::optional<NiftiHeader> nifti_header(const fs::path& path) {
   std::vector<unsigned char> bytes(540);
@@ -166,25 +159,27 @@ void restore_non_finite(AnyImage& image, const fs::path& path) {
 Result<std::vector<std::string>> check_nifti(const fs::path& path) {
   const auto header = nifti_header(path);
   if (!header)
-    return bad(path, "cannot be read as NIfTI", {}, "the file must start with a NIfTI header");
+    return bad_image(path, "cannot be read as NIfTI", {},
+                     "the file must start with a NIfTI header");
   if (header->dim[0] < 1 || header->dim[0] > 7)
-    return bad(path, "number of dimensions is not usable", fmt::format("{}", header->dim[0]),
-               "NIfTI has 1 to 7");
+    return bad_image(path, "number of dimensions is not usable", fmt::format("{}", header->dim[0]),
+                     "NIfTI has 1 to 7");
   for (std::size_t i = 1; i <= static_cast<std::size_t>(header->dim[0]); ++i)
     if (header->dim[i] < 1)
-      return bad(path, fmt::format("extent of axis {} is not positive", i - 1),
-                 fmt::format("{}", header->dim[i]), "every extent must be positive");
+      return bad_image(path, fmt::format("extent of axis {} is not positive", i - 1),
+                       fmt::format("{}", header->dim[i]), "every extent must be positive");
   for (std::size_t i = 1; i <= static_cast<std::size_t>(std::min(3LL, header->dim[0])); ++i)
     if (!(header->pixdim[i] > 0) || !std::isfinite(header->pixdim[i]))
-      return bad(path, fmt::format("spacing of axis {} is not positive", i - 1),
-                 fmt::format("{}", header->pixdim[i]), "spacing must be positive");
+      return bad_image(path, fmt::format("spacing of axis {} is not positive", i - 1),
+                       fmt::format("{}", header->pixdim[i]), "spacing must be positive");
+
   const unsigned long long expected = header->bytes();
   return unpacked_size(path, expected)
       .and_then([&](unsigned long long size) -> Result<std::vector<std::string>> {
         // Of a header in a file of its own (.hdr) nothing is known here; .nii holds its voxels.
         if (size < expected)
-          return bad(path, "file is cut short", fmt::format("{} bytes", size),
-                     fmt::format("its header promises {}", expected));
+          return bad_image(path, "file is cut short", fmt::format("{} bytes", size),
+                           fmt::format("its header promises {}", expected));
         std::vector<std::string> notes;
         if (!std::isfinite(header->slope))
           notes.push_back("intensity slope is not finite: 1 is taken");
@@ -262,8 +257,8 @@ Result<unsigned long long> meta_data_bytes(const MetaHeader& h, const fs::path& 
   std::error_code error;
   const auto size = fs::file_size(data, error);
   if (error)
-    return bad(path, "file of voxels is missing", name,
-               "ElementDataFile must name a file beside it");
+    return bad_image(path, "file of voxels is missing", name,
+                     "ElementDataFile must name a file beside it");
   return size;
 }
 
@@ -273,19 +268,23 @@ Result<MetaScaling> check_meta(const fs::path& path) {
   const MetaHeader h = parse_meta(path);
   for (const char* key : {"NDims", "DimSize", "ElementType", "ElementDataFile"})
     if (h.get(key).empty())
-      return bad(path, "cannot be read as MetaImage", {},
-                 fmt::format("its header must give {}", key));
+      return bad_image(path, "cannot be read as MetaImage", {},
+                       fmt::format("its header must give {}", key));
   const std::vector<double> dims = numbers(h.get("DimSize"));
   unsigned long long count = 1;
   for (const double n : dims) {
     if (!(n >= 1) || n != std::floor(n) || n > 1e9)
-      return bad(path, "DimSize is not usable", h.get("DimSize"), "extents are positive integers");
+      return bad_image(path, "DimSize is not usable", h.get("DimSize"),
+                       "extents are positive integers");
     count *= static_cast<unsigned long long>(n);
   }
+
   for (const char* key : {"ElementSpacing", "ElementSize"})
     for (const double s : numbers(h.get(key)))
       if (!(s > 0) || !std::isfinite(s))
-        return bad(path, "spacing is not positive", h.get(key), "spacing must be positive");
+        return bad_image(path, "spacing is not positive", h.get(key), "spacing must be positive");
+
+  // What the header promises, against what there is; a type that is not known promises nothing.
   const Result<unsigned long long> size = meta_data_bytes(h, path);
   if (!size) return fail(size.error());
   const auto bytes = kMetaBytes.find(h.get("ElementType"));
@@ -293,22 +292,24 @@ Result<MetaScaling> check_meta(const fs::path& path) {
   unsigned long long expected = bytes == kMetaBytes.end() ? 0 : count * bytes->second;
   if (!channels.empty() && channels[0] > 1)
     expected *= static_cast<unsigned long long>(channels[0]);
+
   if (is_true(h.get("CompressedData"))) {
     const std::vector<double> packed = numbers(h.get("CompressedDataSize"));
     expected = packed.empty() || !(packed[0] > 0) ? 1 : static_cast<unsigned long long>(packed[0]);
   }
   if (*size < expected)
-    return bad(path, "file is cut short", fmt::format("{} bytes of voxels", *size),
-               fmt::format("its header promises {}", expected));
+    return bad_image(path, "file is cut short", fmt::format("{} bytes of voxels", *size),
+                     fmt::format("its header promises {}", expected));
+
   MetaScaling scaling;
   const auto slope = numbers(h.get("ElementToIntensityFunctionSlope"));
   const auto offset = numbers(h.get("ElementToIntensityFunctionOffset"));
   if (!slope.empty()) scaling.slope = slope[0];
   if (!offset.empty()) scaling.offset = offset[0];
   if (!std::isfinite(scaling.slope) || !std::isfinite(scaling.offset) || scaling.slope == 0)
-    return bad(path, "intensity scaling is not usable",
-               fmt::format("slope {}, offset {}", scaling.slope, scaling.offset),
-               "they are finite, the slope is not 0");
+    return bad_image(path, "intensity scaling is not usable",
+                     fmt::format("slope {}, offset {}", scaling.slope, scaling.offset),
+                     "they are finite, the slope is not 0");
   return scaling;
 }
 

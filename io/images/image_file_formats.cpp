@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "io/images/rules.h"
+
 namespace angiospline::image_formats {
 namespace fs = std::filesystem;
 
@@ -104,8 +106,7 @@ Result<ImageGrid> checked(ImageGrid grid, const fs::path& path) {
     return bad_image(path, "origin is not finite", {},
                      "the position of the first voxel must be finite");
   const Mat3 gram = grid.direction.transpose() * grid.direction;
-  // Files keep direction cosines with four digits or more; more than that is a sheared grid.
-  if (!grid.direction.allFinite() || !gram.isIdentity(1e-3))
+  if (!grid.direction.allFinite() || !gram.isIdentity(kDirectionRounding))
     return bad_image(path, "axes of the image are not orthogonal", {},
                      "the direction must be a rotation or reflection: resample the image");
 

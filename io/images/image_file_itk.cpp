@@ -98,6 +98,7 @@ Result<void> is_whole_dicom(const std::filesystem::path& path) {
   std::ifstream(path, std::ios::binary)
       .read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (bytes.size() < 132 || bytes.compare(128, 4, "DICM") != 0) return {};
+
   const std::string tag("\xe0\x7f\x10\x00", 4);  // little endian; the other order is retired
   std::optional<std::uintmax_t> promised;
   for (std::size_t at = bytes.find(tag); at != std::string::npos; at = bytes.find(tag, at + 1)) {
@@ -111,6 +112,7 @@ Result<void> is_whole_dicom(const std::filesystem::path& path) {
     promised = length_at + 4 + length;
     if (length == 0xffffffff || *promised <= size) return {};
   }
+
   if (!promised) return {};
   return fail({ErrorKind::kBadInput, "file is cut short", path.string(),
                fmt::format("{} bytes", size), fmt::format("its header promises {}", *promised)});
@@ -133,6 +135,7 @@ Description description_of(const itk::ImageIOBase& io) {
   for (unsigned i = 0; i < dims; ++i) d.axes.push_back(static_cast<long long>(io.GetDimensions(i)));
   d.components = io.GetNumberOfComponents();
   d.grid.size = {1, 1, 1};
+
   for (unsigned i = 0; i < std::min(dims, 3U); ++i) {
     d.grid.size[i] =
         static_cast<int>(std::min<long long>(d.axes[i], std::numeric_limits<int>::max()));
@@ -252,6 +255,7 @@ Result<std::vector<DicomSeries>> dicom_series(const std::filesystem::path& folde
       while (!uid.empty() && (uid.back() == ' ' || uid.back() == '\0')) uid.pop_back();
       files[uid].push_back(name);
     }
+
     std::vector<DicomSeries> result;
     for (auto& [uid, names] : files) {
       std::sort(names.begin(), names.end());  // folders list in no order
@@ -279,6 +283,7 @@ Result<void> write(const Image<T>& image, const std::filesystem::path& path, For
       io->SetDirection(i, std::vector<double>(axis.data(), axis.data() + 3));
       region.SetSize(i, static_cast<itk::SizeValueType>(image.grid.size[i]));
     }
+
     io->SetIORegion(region);
     io->SetNumberOfComponents(1);
     io->SetPixelType(itk::IOPixelEnum::SCALAR);

@@ -81,6 +81,8 @@ Result<AnyImage> read_vti(const std::filesystem::path& path) {
   vtkImageData* data = reader->GetOutput();
   if (reader->GetErrorCode() != 0 || data == nullptr)
     return fail(unreadable(path, {}, "the file must be complete"));
+
+  // The active scalars are the image; a file that names none is clear if it has one array.
   vtkDataArray* array = data->GetPointData()->GetScalars();
   if (array == nullptr && data->GetPointData()->GetNumberOfArrays() == 1)
     array = data->GetPointData()->GetArray(0);
@@ -91,6 +93,7 @@ Result<AnyImage> read_vti(const std::filesystem::path& path) {
     return fail({ErrorKind::kBadInput, "voxels are vectors", path.string(),
                  fmt::format("{} components", array->GetNumberOfComponents()),
                  "an image has one value a voxel"});
+
   ImageGrid grid;
   int extent[6];
   data->GetExtent(extent);
@@ -101,9 +104,11 @@ Result<AnyImage> read_vti(const std::filesystem::path& path) {
     first_index[i] = extent[2 * i];
     for (int k = 0; k < 3; ++k) grid.direction(i, k) = data->GetDirectionMatrix()->GetElement(i, k);
   }
+
+  // VTK's origin belongs to index 0, not to the extent.
   grid.origin_mm = Vec3(data->GetOrigin());
-  grid.origin_mm =
-      grid.world_mm(first_index);  // VTK's origin belongs to index 0, not to the extent
+  grid.origin_mm = grid.world_mm(first_index);
+
   if (static_cast<std::size_t>(array->GetNumberOfTuples()) != grid.voxel_count())
     return fail(unreadable(path, fmt::format("{} values", array->GetNumberOfTuples()),
                            "the file must be complete"));
@@ -124,13 +129,15 @@ Result<void> write_vti(const Image<T>& image, const std::filesystem::path& path)
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) direction->SetElement(i, k, grid.direction(i, k));
   data->SetDirectionMatrix(direction);
+
+  // The writer only reads: the array borrows our voxels (last argument 1: VTK does not free them).
   const auto array =
       vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtk_type<T>()));
   array->SetName("ImageScalars");
-  // The writer only reads: the array borrows our voxels (last argument 1: VTK does not free them).
   array->SetVoidArray(const_cast<T*>(image.voxels.data()),
                       static_cast<vtkIdType>(image.voxels.size()), 1);
   data->GetPointData()->SetScalars(array);
+
   vtkNew<vtkXMLImageDataWriter> writer;
   writer->SetFileName(path.c_str());
   writer->SetInputData(data);

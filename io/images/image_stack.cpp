@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "io/images/image_file_formats.h"
+#include "io/images/rules.h"
 
 namespace angiospline::image_formats {
 namespace fs = std::filesystem;
@@ -32,6 +33,8 @@ bool natural_less(const std::string& a, const std::string& b) {
     std::size_t i_end = i, j_end = j;
     while (i_end < a.size() && digit(a[i_end])) ++i_end;
     while (j_end < b.size() && digit(b[j_end])) ++j_end;
+
+    // Leading zeros count for nothing; then the longer number is the larger.
     while (i < i_end - 1 && a[i] == '0') ++i;
     while (j < j_end - 1 && b[j] == '0') ++j;
     if (i_end - i != j_end - j) return i_end - i < j_end - j;
@@ -133,15 +136,13 @@ Result<double> slice_distance(const std::vector<Slice>& slices) {
   std::nth_element(sorted.begin(), sorted.begin() + std::ssize(sorted) / 2, sorted.end());
   const double usual = sorted[sorted.size() / 2];
 
-  // Scanners round positions to a few micrometres; a tenth of the distance is far above that and
-  // far below a missing slice.
   for (std::size_t k = 0; k < gaps.size(); ++k) {
     const std::string place = slices[k + 1].file.filename().string();
-    if (gaps[k] <= 0.1 * usual)
+    if (gaps[k] <= kSliceDistanceSlack * usual)
       return bad_image(slices[k + 1].file, "two slices are at the same place",
                        fmt::format("{} and {}", slices[k].file.filename().string(), place),
                        "a series has one slice a position");
-    if (std::abs(gaps[k] - usual) > 0.1 * usual)
+    if (std::abs(gaps[k] - usual) > kSliceDistanceSlack * usual)
       return bad_image(slices[k + 1].file, "slices are not at even distances",
                        fmt::format("{:.4g} mm between {} and {}", gaps[k],
                                    slices[k].file.filename().string(), place),
@@ -163,8 +164,7 @@ Result<std::vector<Slice>> sorted_slices(const DicomSeries& series) {
   const Vec3 normal =
       slices.front().grid.direction.col(0).cross(slices.front().grid.direction.col(1));
   for (Slice& s : slices) {
-    if (!s.grid.direction.isApprox(slices.front().grid.direction,
-                                   1e-3))  // direction cosines carry 4 digits or more
+    if (!s.grid.direction.isApprox(slices.front().grid.direction, kDirectionRounding))
       return bad_image(s.file, "slice is turned against the others", {},
                        "the slices of a series are parallel");
     s.height_mm = normal.dot(s.grid.origin_mm);
@@ -203,7 +203,7 @@ Result<ImageStack> read_dicom_series(const fs::path& folder, const ReadImageOpti
 
   // A tilted gantry shears the stack: positions drift sideways from slice to slice.
   const double sideways = (run - run.dot(grid.direction.col(2)) * grid.direction.col(2)).norm();
-  if (sideways > 0.5 * grid.spacing_mm.minCoeff())
+  if (sideways > kLargestDrift * grid.spacing_mm.minCoeff())
     return bad_image(folder, "slices are sheared (tilted gantry)",
                      fmt::format("{:.4g} mm over the series", sideways),
                      "slices must be stacked along their normal: resample the series first");

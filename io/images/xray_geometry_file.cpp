@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "io/images/image_file.h"
+#include "io/images/rules.h"
 
 namespace angiospline {
 namespace {
@@ -89,13 +90,15 @@ Result<XrayGeometry> full_geometry_of(const Fields& f) {
     if (!v) return fail(v.error());
     *target = *v;
   }
+
   const auto pixel = f.vector<2>("pixel_mm");
   if (!pixel) return fail(pixel.error());
   if (!(pixel->minCoeff() > 0))
     return fail(f.error("pixel_mm", "pixel is not positive", "above 0"));
   g.pixel_mm = *pixel;
+
   const double sine = g.column_axis.normalized().cross(g.row_axis.normalized()).norm();
-  if (!(sine > 0.01))  // less than a degree apart spans no plane that anyone meant
+  if (!(sine > image_formats::kSmallestAxisSine))
     return fail(f.error("row_axis", "axes span no plane", "column_axis and row_axis differ"));
   g.column_axis.normalize();
   g.row_axis.normalize();
@@ -108,6 +111,7 @@ Result<XrayView> view_of(const Json& object, const std::filesystem::path& path, 
   if (!name) return fail(name.error());
   Result<ImageFile> file = read_flat_image(path.parent_path() / *name);
   if (!file) return fail(file.error());
+
   XrayView view;
   std::visit(
       [&](const auto& in) {
@@ -116,6 +120,8 @@ Result<XrayView> view_of(const Json& object, const std::filesystem::path& path, 
                        [](auto v) { return static_cast<float>(v); });
       },
       file->image);
+
+  // A C-arm's axis meets the middle of its detector: the number of pixels is the image's.
   const Voxel size = view.image.grid.size;
   Result<XrayGeometry> geometry = f.has("angle_deg") ? c_arm_of(f, size[0]) : full_geometry_of(f);
   if (!geometry) return fail(geometry.error());
@@ -139,6 +145,7 @@ Result<std::vector<XrayView>> read_xray_views(const std::filesystem::path& path)
                  path.string(),
                  {},
                  "it must be JSON with a non-empty array \"views\""});
+
   std::vector<XrayView> views;
   for (std::size_t k = 0; k < json.at("views").size(); ++k) {
     Result<XrayView> view = view_of(json.at("views").at(k), path, k);

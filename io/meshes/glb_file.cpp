@@ -36,7 +36,10 @@ class BufferBuilder {
     view.target = target;
     bytes_.resize(bytes_.size() + view.byteLength);
     std::memcpy(bytes_.data() + view.byteOffset, items.data(), view.byteLength);
+
+    // An accessor must begin at a multiple of its component (glTF 2.0, section 3.6.2.4).
     while (bytes_.size() % 4 != 0) bytes_.push_back(0);
+
     tinygltf::Accessor accessor;
     accessor.bufferView = static_cast<int>(model_.bufferViews.size());
     accessor.componentType = component;
@@ -110,11 +113,14 @@ void add_part(tinygltf::Model& model, BufferBuilder& buffer, const TriangleMesh&
     positions.push_back(gltf_from_world(mesh.points_mm.col(k)).cast<float>());
   }
   for (const Vec3& n : arrays.normals) normals.push_back(turned(n).cast<float>());
+
+  // One primitive a part: its name and material are what other programs select by.
   tinygltf::Primitive primitive;
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
   primitive.attributes["POSITION"] = buffer.add_positions(positions);
   primitive.attributes["NORMAL"] = buffer.add(normals, TINYGLTF_COMPONENT_TYPE_FLOAT,
                                               TINYGLTF_TYPE_VEC3, TINYGLTF_TARGET_ARRAY_BUFFER);
+
   if (options.field && is_wall(part.kind)) {
     const ColourScale scale = scale_of(*options.field);
     std::vector<Eigen::Vector4f> colours;
@@ -129,6 +135,7 @@ void add_part(tinygltf::Model& model, BufferBuilder& buffer, const TriangleMesh&
     primitive.material = material_index(model, valid_utf8(part.name), part_colour(part));
   }
   primitive.indices = buffer.add_indices(arrays.indices, arrays.points.size());
+
   tinygltf::Mesh gltf_mesh;
   gltf_mesh.name = valid_utf8(part.name);
   gltf_mesh.primitives.push_back(std::move(primitive));
@@ -173,6 +180,7 @@ Result<std::string> mesh_to_glb(const TriangleMesh& mesh, const GlbOptions& opti
   model.scenes[0].nodes = {0};
   model.defaultScene = 0;
   model.nodes.push_back(root_node(options));
+
   BufferBuilder buffer(model);
   const std::vector<PartArrays> parts = arrays_of_parts(mesh);
   for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -182,6 +190,7 @@ Result<std::string> mesh_to_glb(const TriangleMesh& mesh, const GlbOptions& opti
     return fail({ErrorKind::kFailed, "mesh is too large for one binary glTF file", "glTF",
                  std::to_string(buffer.size()) + " bytes", "a GLB holds less than 4 GB"});
   }
+
   buffer.finish();
   std::ostringstream stream;
   if (!tinygltf::TinyGLTF().WriteGltfSceneToStream(&model, stream, false, true) || !stream) {

@@ -29,6 +29,8 @@ std::vector<PartArrays> arrays_of_parts(const TriangleMesh& mesh) {
     plane[p] += area_vector(mesh, t);
     triangles[p].push_back(t);
   }
+
+  // A point on the border of two parts is one of each; it is numbered anew for every part.
   std::vector<std::uint32_t> number(static_cast<std::size_t>(mesh.points_mm.cols()));
   std::vector<int> numbered_for(number.size(), -1);
   for (std::size_t p = 0; p < parts.size(); ++p) {

@@ -40,6 +40,7 @@ std::vector<Solid> solids_of(const TriangleMesh& mesh, StlGrouping grouping) {
     solid_of.push_back(solids.size());
     solids.push_back({word(part.name), {}});
   }
+
   for (int t = 0; t < mesh.triangles.cols(); ++t) {
     const auto part = static_cast<std::size_t>(mesh.part_of[static_cast<std::size_t>(t)]);
     solids[solid_of[part]].triangles.push_back(t);
@@ -119,12 +120,15 @@ TriangleMesh connect(const Soup& soup) {
     const auto kb = key(b);
     return ka != kb ? ka < kb : a < b;
   });
+
   std::vector<int> first(order.size());  // the first corner at the same place
   for (std::size_t k = 0; k < order.size(); ++k) {
     const bool same = k > 0 && key(order[k - 1]) == key(order[k]);
     first[static_cast<std::size_t>(order[k])] =
         same ? first[static_cast<std::size_t>(order[k - 1])] : order[k];
   }
+
+  // Triangles that fall together to a line or a point are left out: they have no area.
   std::vector<int> number(order.size(), -1);
   TriangleMesh mesh;
   mesh.parts = soup.parts;
@@ -180,10 +184,13 @@ Result<TriangleMesh> from_binary(std::string_view bytes, const std::string& file
       }
       soup.corners.push_back(p);
     }
+
+    // Our own files keep the part in the attribute, which others leave 0 or use for colours.
     const int part = ours ? value_at<std::uint16_t>(bytes, start + 48) : 0;
     most = std::max(most, part);
     soup.part_of.push_back(part);
   }
+
   for (int p = 0; p <= most; ++p) {
     soup.parts.push_back({ours ? "part_" + std::to_string(p) : "surface", PartKind::kBody, 0.0});
   }
@@ -235,6 +242,7 @@ class AsciiReader {
                    "solid, facet, outer loop, vertex, endloop, endfacet, endsolid");
       }
     }
+
     if (in_facet || in_solid >= 0)
       return bad("file ends inside a solid", {}, "the last line is endsolid");
     if (soup.part_of.empty()) return bad("no facet", {}, "a mesh has facets");
@@ -304,6 +312,7 @@ Result<TriangleMesh> mesh_from_stl(std::string_view bytes, const std::string& fi
       has_count ? kHeaderSize + 4 + kFacetSize * value_at<std::uint32_t>(bytes, kHeaderSize) : 0;
   if (has_count && bytes.size() == wanted && wanted > kHeaderSize + 4)
     return from_binary(bytes, file);
+
   const std::size_t start = bytes.find_first_not_of(" \t\r\n");
   const std::string_view first = bytes.substr(std::min(start, bytes.size()), 5);
   if (first == "solid" || first == "SOLID") {

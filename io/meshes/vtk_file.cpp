@@ -63,10 +63,12 @@ void add_mesh_arrays(vtkPointSet& set, const TriangleMesh& mesh,
   }
   set.GetCellData()->AddArray(face_id);
   set.GetCellData()->AddArray(entity_id);
+
   vtkNew<vtkStringArray> names;
   names->SetName("FaceNames");
   for (const MeshPart& part : mesh.parts) names->InsertNextValue(valid_utf8(part.name));
   set.GetFieldData()->AddArray(names);
+
   if (mesh.normals.cols() > 0) {
     vtkNew<vtkFloatArray> normals;
     normals->SetName("Normals");
@@ -74,6 +76,7 @@ void add_mesh_arrays(vtkPointSet& set, const TriangleMesh& mesh,
     for (const auto& n : mesh.normals.colwise()) normals->InsertNextTuple3(n[0], n[1], n[2]);
     set.GetPointData()->SetNormals(normals);
   }
+
   for (const MeshField& field : fields) {
     vtkNew<vtkDoubleArray> values;
     values->SetName(valid_utf8(field.name).c_str());
@@ -103,10 +106,12 @@ TriangleMesh mesh_of(vtkPointSet& set) {
   mesh.points_mm.resize(3, set.GetNumberOfPoints());
   for (vtkIdType k = 0; k < set.GetNumberOfPoints(); ++k)
     set.GetPoint(k, mesh.points_mm.col(k).data());
+
   auto* ids = vtkIntArray::SafeDownCast(set.GetCellData()->GetArray("ModelFaceID"));
   auto* names = vtkStringArray::SafeDownCast(set.GetFieldData()->GetAbstractArray("FaceNames"));
   std::map<int, int> part_of_id;
   if (ids == nullptr) mesh.parts.push_back({"surface", PartKind::kBody, 0.0});
+
   std::vector<Eigen::Vector3i> triangles;
   vtkNew<vtkIdList> points;
   for (vtkIdType c = 0; c < set.GetNumberOfCells(); ++c) {
@@ -116,6 +121,8 @@ TriangleMesh mesh_of(vtkPointSet& set) {
     const bool strip = type == VTK_TRIANGLE_STRIP;
     if (count < 3 || !(strip || type == VTK_TRIANGLE || type == VTK_POLYGON || type == VTK_QUAD))
       continue;
+
+    // Parts are numbered in the order in which their ids are met.
     int part = 0;
     if (ids != nullptr) {
       const int id = ids->GetValue(c);
@@ -128,6 +135,8 @@ TriangleMesh mesh_of(vtkPointSet& set) {
         mesh.parts.push_back({name, part_kind_of_name(name), 0.0});
       }
     }
+
+    // A polygon is a fan from its first point; in a strip every second triangle is turned.
     for (vtkIdType k = 1; k + 1 < count; ++k) {
       const vtkIdType first = strip ? k - 1 : 0;
       Eigen::Vector3i t(static_cast<int>(points->GetId(first)), static_cast<int>(points->GetId(k)),
@@ -137,6 +146,7 @@ TriangleMesh mesh_of(vtkPointSet& set) {
       mesh.part_of.push_back(part);
     }
   }
+
   mesh.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     mesh.triangles.col(static_cast<Eigen::Index>(t)) = triangles[t];
@@ -160,6 +170,7 @@ Result<void> write_vtk_mesh(const std::filesystem::path& path, const TriangleMes
     writer->SetInputData(data);
     return write_vtk_xml(path, *writer);
   }
+
   if (suffix == ".vtu") {
     vtkNew<vtkUnstructuredGrid> data;
     data->SetPoints(vtk_points(mesh.points_mm));
@@ -183,6 +194,7 @@ Result<TriangleMesh> read_vtk_mesh(const std::filesystem::path& path) {
     vtkNew<vtkXMLPolyDataReader> reader;
     if (read_xml(*reader, path)) mesh = mesh_of(*reader->GetOutput());
   }
+
   if (mesh.triangles.cols() == 0) {
     return fail(unreadable(path, "no triangles could be read", "a VTK XML file with a surface"));
   }

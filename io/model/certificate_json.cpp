@@ -22,6 +22,7 @@ json to_json(const Certificate& c) {
     faces.push_back(
         {{"name", face.name}, {"kind", to_string(face.kind)}, {"area_mm2", face.area_mm2}});
   }
+
   json result;
   result["solids"] = c.solids;
   result["closed"] = c.closed;
@@ -31,6 +32,8 @@ json to_json(const Certificate& c) {
   result["area_mm2"] = c.area_mm2;
   result["bounding_box_mm"] = {point(c.lowest_mm), point(c.highest_mm)};
   result["faces"] = std::move(faces);
+
+  // What was measured at edges; null stands where there was none to measure.
   result["smooth_edges"] = c.smooth_edges;
   result["free_edges"] = c.free_edges;
   result["max_gap_mm"] = c.max_gap_mm;
@@ -44,6 +47,7 @@ json to_json(const Certificate& c) {
       c.max_curvature_times_radius ? json(*c.max_curvature_times_radius) : json();
   result["max_curvature_face"] = optional_text(c.max_curvature_face);
   result["genus"] = c.genus ? json(*c.genus) : json();
+
   result["self_intersections"] = json::array();
   for (const FaceCrossing& crossing : c.self_intersections) {
     result["self_intersections"].push_back(
@@ -70,11 +74,13 @@ std::string to_text(const Certificate& c) {
     line("  crossing", fmt::format("{} and {} at ({:.4g}, {:.4g}, {:.4g}) mm", x.faces[0],
                                    x.faces[1], x.at_mm.x(), x.at_mm.y(), x.at_mm.z()));
   }
+
   line("volume", fmt::format("{:.9g} mm3", c.volume_mm3));
   line("area", fmt::format("{:.9g} mm2", c.area_mm2));
   line("bounding box", fmt::format("({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}) mm",
                                    c.lowest_mm.x(), c.lowest_mm.y(), c.lowest_mm.z(),
                                    c.highest_mm.x(), c.highest_mm.y(), c.highest_mm.z()));
+
   std::map<FaceKind, int> kinds;
   for (const FaceCertificate& face : c.faces) ++kinds[face.kind];
   std::string faces = fmt::format("{}", c.faces.size());
@@ -82,6 +88,7 @@ std::string to_text(const Certificate& c) {
     faces += fmt::format(", {} {}", count, to_string(kind));
   }
   line("faces", faces);
+
   line("genus", c.genus ? fmt::format("{}", *c.genus) : "none: the surface is open");
   line("free edges", fmt::format("{}", c.free_edges));
   line("smooth edges", fmt::format("{}", c.smooth_edges));
@@ -94,6 +101,7 @@ std::string to_text(const Certificate& c) {
            : "none: no smooth edge");
   line("smallest Jacobian ratio",
        fmt::format("{:.4g}, {}", c.min_jacobian_ratio, c.min_jacobian_face));
+
   if (c.max_curvature_times_radius) {
     line("largest curvature x radius",
          fmt::format("{:.4g}, {}", *c.max_curvature_times_radius, c.max_curvature_face));

@@ -54,6 +54,8 @@ Json to_json(const SurfaceNetwork& network) {
   for (const char* key : {"patches", "regions", "joins", "rims", "dependencies"}) {
     json[key] = Json::array();
   }
+
+  // Keys keep this order; an index in the file is a place in one of these lists.
   for (const Patch& patch : network.patches) {
     json["patches"].push_back({{"region", patch.region},
                                {"u", to_json(patch.u)},
@@ -85,6 +87,7 @@ Json to_json(const CenterlineTree& tree) {
   for (const CenterlineNode& node : tree.nodes) {
     nodes.push_back({{"name", node.name}, {"position_mm", to_json(node.position_mm)}});
   }
+
   Json branches = Json::array();
   for (const CenterlineBranch& branch : tree.branches) {
     branches.push_back(
@@ -298,6 +301,7 @@ Model read_document(const Cursor& c) {
                                "unknown schema version");
   }
   if (c["units"]["length"].text() != "mm") c["units"]["length"].refuse("mm", "unknown unit");
+
   Model model;
   model.name = c["name"].text();
   model.assumptions = read_texts(c["assumptions"]);
@@ -318,6 +322,7 @@ std::string model_to_json(const Model& model) {
   for (const FailedPart& part : model.failed) {
     failed.push_back({{"name", part.name}, {"why", part.why}});
   }
+
   const Json json{
       {"schema", kSchema},
       {"schema_version", kModelSchemaVersion},

@@ -47,6 +47,8 @@ class LegacyReader {
     if (mode != "ascii" && mode != "binary")
       return bad("the format is not known", mode, "ASCII or BINARY");
     binary_ = mode == "binary";
+
+    // The three lines of the head are behind; what follows is told by its keyword.
     while (true) {
       const std::string keyword = lower_case(word());
       if (keyword.empty()) break;
@@ -136,6 +138,7 @@ class LegacyReader {
       if (type != "polydata") return bad("the data set has no lines of its own", type, "POLYDATA");
       return {};
     }
+
     if (keyword == "points") return points();
     if (keyword == "lines" || keyword == "vertices" || keyword == "polygons" ||
         keyword == "triangle_strips") {
@@ -154,6 +157,7 @@ class LegacyReader {
       return skip_numbers(3);
     }
     if (keyword == "field") return field();
+
     if (keyword == "metadata") {
       skip_line();
       while (at_ < bytes_.size() && !trimmed_lines(rest_line()).empty()) skip_line();
@@ -268,6 +272,8 @@ class LegacyReader {
       components = static_cast<std::size_t>(*number);
       word();
     }
+
+    // The line of the lookup table may be missing.
     const std::size_t behind = at_;
     if (lower_case(word()) == "lookup_table") {
       word();
@@ -298,6 +304,7 @@ class LegacyReader {
         while (at_ < bytes_.size() && !trimmed_lines(rest_line()).empty()) skip_line();
         array_name = word();
       }
+
       const auto components = count(0);
       if (!components) return fail(components.error());
       const auto tuples = count(0);
@@ -309,6 +316,7 @@ class LegacyReader {
       }
       const auto type = number_type(type_word);
       if (!type) return fail(type.error());
+
       if (*components > 0 && *tuples > bytes_.size() / *components) {
         return bad("the count cannot be true", array_name, "the file is too small for it");
       }

@@ -129,6 +129,7 @@ Result<std::vector<Out>> numbers_in_text(const VtpArray& a, std::size_t count,
                      fmt::format("{} numbers are needed", count));
   };
   if (count > a.text.size()) return cut_short();
+
   std::vector<Out> out;
   out.reserve(count);
   std::string_view rest = a.text;

@@ -49,6 +49,8 @@ class VtpReader {
                    {},
                    "a VTKFile of type PolyData"});
     }
+
+    // Comments before the data may name the frame; they are read for it and no further.
     const std::size_t header_end = bytes_.find("<PolyData");
     lines_.header = std::string(bytes_.substr(0, std::min<std::size_t>(header_end, 4096)));
     for (const Piece& piece : pieces_) {
@@ -74,6 +76,7 @@ class VtpReader {
         if (tag == section) section.clear();
         continue;
       }
+
       Result<void> taken;
       if (tag == "VTKFile") taken = file();
       if (tag == "Piece") taken = piece();

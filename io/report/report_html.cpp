@@ -119,6 +119,7 @@ Json summary_json(const Model& model, const Json& branches, std::size_t junction
     return std::count_if(model.network.rims.begin(), model.network.rims.end(),
                          [&](const Rim& rim) { return rim.kind == kind; });
   };
+
   double length = 0;
   for (const Json& branch : branches) length += branch["length_mm"].get<double>();
   return {{"branches", model.tree.branches.size()},
@@ -315,6 +316,7 @@ Json image_json(const ReportImage& image) {
       points.push_back({std::round(p.x() * 100) / 100, std::round(p.y() * 100) / 100});
     lines.push_back(std::move(points));
   }
+
   const std::string bytes(image.grey.begin(), image.grey.end());
   return {{"title", valid_utf8(image.title)},
           {"width", image.width},

@@ -49,9 +49,12 @@ std::vector<std::uint8_t> grey_of(const std::vector<float>& values) {
     std::nth_element(sorted.begin(), sorted.begin() + at, sorted.end());
     return sorted[static_cast<std::size_t>(at)];
   };
+
+  // A few bright or dark voxels, of implants or of air, must not take all of the contrast.
   const float low = rank(0.01);
   float high = rank(0.999);
   if (!(high > low)) high = *std::max_element(values.begin(), values.end());
+
   std::vector<std::uint8_t> grey;
   grey.reserve(values.size());
   for (const float v : values) {
@@ -71,18 +74,23 @@ ReportImage project(const Image<T>& image, const CenterlineTree& tree, int throu
   picture.width = size(h.across);
   picture.height = size(h.down);
   picture.pixel_mm = {grid.spacing_mm[h.across], grid.spacing_mm[h.down]};
+
+  // Titles name the axis of the world that is nearest to the one looked along.
   const auto ends = ends_of_axis(grid, through);
   const char axis = ends[0] == 'R' || ends[0] == 'L'   ? 'x'
                     : ends[0] == 'A' || ends[0] == 'P' ? 'y'
                                                        : 'z';
   picture.title = std::string(vessels == Polarity::kBright ? "maximum" : "minimum") +
                   " intensity along " + axis + ", with centerlines";
+
   const auto column = [&](int voxel) { return h.flip_across ? picture.width - 1 - voxel : voxel; };
   const auto row = [&](int voxel) { return h.flip_down ? picture.height - 1 - voxel : voxel; };
   const auto pixels =
       static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
   std::vector<float> best(pixels);
   std::vector<char> seen(pixels, 0);
+
+  // Voxels are visited as they lie in memory; the picture is small enough to stay in the cache.
   Voxel v{};
   for (v[2] = 0; v[2] < size(2); ++v[2]) {
     for (v[1] = 0; v[1] < size(1); ++v[1]) {
@@ -98,6 +106,8 @@ ReportImage project(const Image<T>& image, const CenterlineTree& tree, int throu
     }
   }
   picture.grey = grey_of(best);
+
+  // Centerlines in pixels, flipped as the picture is.
   for (const CenterlineBranch& branch : tree.branches) {
     std::vector<Vec2> line;
     for (const auto& p : branch.points_mm.colwise()) {

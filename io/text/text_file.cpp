@@ -37,6 +37,8 @@ Result<std::string> read_bytes(const std::filesystem::path& path, std::size_t ma
   if (std::filesystem::is_directory(status)) {
     return fail({ErrorKind::kBadInput, "is a folder, not a file", name, {}, {}});
   }
+
+  // Read in blocks: whatever the file says of its size, no more than max_bytes is kept.
   std::ifstream stream(path, std::ios::binary);
   if (!stream) return fail({ErrorKind::kBadInput, "cannot be opened for reading", name, {}, {}});
   std::string text;
@@ -50,6 +52,7 @@ Result<std::string> read_bytes(const std::filesystem::path& path, std::size_t ma
                    fmt::format("a file may have {} bytes", max_bytes)});
     }
   }
+
   if (stream.bad()) return fail({ErrorKind::kBadInput, "cannot be read to its end", name, {}, {}});
   if (text.empty()) {
     return fail({ErrorKind::kBadInput, "is empty", name, {}, "there must be at least one point"});

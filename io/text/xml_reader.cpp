@@ -73,6 +73,7 @@ Result<XmlReader::Event> XmlReader::next() {
       if (open_.empty()) return Event::kDone;
       return bad("the file stops inside an element", open_.back(), "every element is closed");
     }
+
     if (text_[at_] != '<') {
       const std::size_t end = std::min(text_.find('<', at_), text_.size());
       const std::string_view raw = text_.substr(at_, end - at_);
@@ -83,6 +84,7 @@ Result<XmlReader::Event> XmlReader::next() {
       content_ = std::move(*plain);
       return Event::kText;
     }
+
     if (text_.substr(at_, 9) == "<![CDATA[") {
       const std::size_t end = text_.find("]]>", at_);
       if (end == std::string_view::npos) return bad("CDATA without an end", {}, "it ends with ]]>");
@@ -90,6 +92,7 @@ Result<XmlReader::Event> XmlReader::next() {
       at_ = end + 3;
       return Event::kText;
     }
+
     const Result<bool> skipped = skip_markup();
     if (!skipped) return fail(skipped.error());
     if (!*skipped) return element();
@@ -109,6 +112,7 @@ Result<bool> XmlReader::skip_markup() {
   } else {
     return false;
   }
+
   const std::size_t found = rest.find(end, 2);
   if (found == std::string_view::npos) return bad("markup without an end", rest.substr(0, 9), "");
   if (end == ">" && rest.substr(0, found).find('[') != std::string_view::npos) {
@@ -134,6 +138,7 @@ Result<XmlReader::Event> XmlReader::element() {
   }
   if (end >= text_.size())
     return bad("a tag without an end", text_.substr(at_, 20), "it ends with >");
+
   std::string_view inside = text_.substr(at_ + 1, end - at_ - 1);
   at_ = end + 1;
   if (!inside.empty() && inside.front() == '/') {
@@ -147,6 +152,8 @@ Result<XmlReader::Event> XmlReader::element() {
     open_.pop_back();
     return Event::kEnd;
   }
+
+  // An empty element is told as a start and an end.
   if (!inside.empty() && inside.back() == '/') {
     ends_itself_ = true;
     inside.remove_suffix(1);
@@ -156,6 +163,7 @@ Result<XmlReader::Event> XmlReader::element() {
   if (tag_.empty() || tag_.find_first_of("<=\"'&") != std::string_view::npos) {
     return bad("a tag without a name", inside, "<name attribute=\"value\">");
   }
+
   if (open_.size() >= kDeepest) {
     return bad("too many open elements", tag_, fmt::format("at most {}", kDeepest));
   }
@@ -175,6 +183,7 @@ Result<void> XmlReader::read_attributes(std::string_view inside) {
       return bad("an attribute without a value", inside, "name=\"value\"");
     const std::string_view key = inside.substr(0, inside.find_last_not_of(kBlank, equals - 1) + 1);
     inside.remove_prefix(equals + 1);
+
     const std::size_t open = inside.find_first_not_of(kBlank);
     const char quote = open == std::string_view::npos ? '\0' : inside[open];
     if (equals == 0 || (quote != '"' && quote != '\'')) {
@@ -183,6 +192,7 @@ Result<void> XmlReader::read_attributes(std::string_view inside) {
     const std::size_t close = inside.find(quote, open + 1);
     if (close == std::string_view::npos)
       return bad("an attribute without an end", key, "name=\"value\"");
+
     Result<std::string> value = decoded(inside.substr(open + 1, close - open - 1));
     if (!value) return fail(value.error());
     attributes_.emplace_back(key, std::move(*value));
@@ -198,10 +208,13 @@ Result<std::string> XmlReader::decoded(std::string_view raw) {
     const std::size_t mark = raw.find('&');
     out.append(raw.substr(0, mark));
     if (mark == std::string_view::npos) return out;
+
+    // Entities are short: a text without a semicolon is not searched to its end.
     raw.remove_prefix(mark + 1);
     const std::size_t end = raw.substr(0, 12).find(';');
     const std::string_view entity = raw.substr(0, end == std::string_view::npos ? 8 : end);
     if (end == std::string_view::npos) return bad("an entity without an end", entity, "&name;");
+
     const auto* const named = std::find_if(kNamed.begin(), kNamed.end(),
                                            [&](const auto& pair) { return pair.first == entity; });
     if (named != kNamed.end()) {
