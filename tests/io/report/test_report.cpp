@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "io/report/report_html.h"
+#include "io/report/report_page.h"
 #include "modeling/network/tessellation.h"
 #include "tests/shapes/sample_networks.h"
 
@@ -100,6 +101,27 @@ TEST(Report, PageHoldsTheGeometryAndNeedsNothingElse) {
   }
   EXPECT_EQ(triangles, static_cast<std::size_t>(s.mesh.triangles.cols()));
   EXPECT_NEAR(largest, 5, 1e-9);
+}
+
+TEST(Report, PageBundlesItsStyleAndScriptsWithTwoMarksLeft) {
+  const std::string page(report_page());
+  const auto count = [&](const std::string& part) {
+    int n = 0;
+    for (std::size_t at = page.find(part); at != std::string::npos; at = page.find(part, at + 1))
+      ++n;
+    return n;
+  };
+  EXPECT_EQ(count("%FACTS%"), 1);
+  EXPECT_EQ(count("%MESH%"), 1);
+  EXPECT_EQ(count("%STYLE%") + count("%SCRIPTS%"), 0);
+  EXPECT_EQ(count("<style>"), 1);
+  EXPECT_EQ(count("</html>"), 1);
+  // The helpers come first, for all scripts use them; the view comes before what is drawn beside
+  // it.
+  EXPECT_LT(page.find("const facts ="), page.find("(function plots()"));
+  EXPECT_LT(page.find("(function plots()"), page.find("function threeD()"));
+  EXPECT_LT(page.find("function threeD()"), page.find("for (const image of facts.images)"));
+  EXPECT_NE(page.find("for (const image of facts.images)"), std::string::npos);
 }
 
 TEST(Report, TextCannotBreakOutOfThePage) {
