@@ -14,6 +14,8 @@
 #include "base/atomic_file.h"
 #include "io/cad/brep_file.h"
 #include "io/cad/iges_file.h"
+#include "io/cad/occt_exchange.h"
+#include "io/cad/rules.h"
 #include "io/cad/step_file.h"
 #include "modeling/check/certificate.h"
 #include "tests/shapes/crafted_networks.h"
@@ -60,6 +62,39 @@ class CadFiles : public testing::Test {
 };
 
 Solid sample() { return make_solid(crafted::tube_of_quarters(1, 6)).value(); }
+
+TEST_F(CadFiles, ASurfaceThatMovedFartherThanRoundingIsNotTheOneWritten) {
+  const Solid solid = make_solid(samples::model_of(samples::tube_with_t_vertex()).network).value();
+  const SolidDigest digest = digest_of(solid);
+  EXPECT_TRUE(expect_same(digest, solid, "f"));
+  int moved = 0;
+  for (std::size_t k = 0; k < digest.faces.size(); ++k) {
+    if (digest.faces[k].samples_mm.empty()) continue;  // planes have none
+    for (const double step : {0.5, 2.0}) {
+      SolidDigest other = digest;
+      other.faces[k].samples_mm[17].x() += step * kDigestTolerance * digest.size_mm;
+      const auto same = expect_same(other, solid, "f");
+      EXPECT_EQ(same.has_value(), step < 1) << digest.faces[k].name;
+      if (!same) EXPECT_EQ(same.error().what, "surface moved: " + digest.faces[k].name);
+      ++moved;
+    }
+  }
+  EXPECT_GE(moved, 2);
+}
+
+TEST_F(CadFiles, FacesThatTurnedOrChangedTheirNamesAreNotThoseWritten) {
+  const Solid solid = make_solid(samples::model_of(samples::tube_with_t_vertex()).network).value();
+  SolidDigest digest = digest_of(solid);
+  digest.faces[0].reversed = !digest.faces[0].reversed;
+  EXPECT_EQ(expect_same(digest, solid, "f").error().what, "face is inside out");
+  digest = digest_of(solid);
+  digest.faces[0].name += "x";
+  EXPECT_EQ(expect_same(digest, solid, "f").error().what,
+            "face name did not survive: " + digest.faces[0].name);
+  digest = digest_of(solid);
+  ++digest.shells;
+  EXPECT_EQ(expect_same(digest, solid, "f").error().what, "other number of shells read back");
+}
 
 TEST_F(CadFiles, KeepNamesKindsAndColoursOfEveryFace) {
   const Solid written = sample();

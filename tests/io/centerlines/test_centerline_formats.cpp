@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -9,6 +10,7 @@
 #include "io/centerlines/graphml_file.h"
 #include "io/centerlines/gxl_file.h"
 #include "io/centerlines/network_tables.h"
+#include "io/centerlines/rules.h"
 #include "io/centerlines/simvascular_file.h"
 #include "io/centerlines/swc_file.h"
 #include "io/centerlines/tree_definition.h"
@@ -48,6 +50,18 @@ bool says(const CenterlineTree& tree, std::string_view part) {
 
 void expect_start(const std::string& message, const std::string& start) {
   EXPECT_EQ(message.substr(0, start.size()), start);
+}
+
+TEST(TreeDefinition, BranchesAreSampledByTheirRadiiAndHairsMoreCoarsely) {
+  const auto points = [](double length, double radius) {
+    const std::string text = "node a 0 0 0\nnode b 0 0 " + std::to_string(length) +
+                             "\nbranch v a b " + std::to_string(radius) + "\n";
+    const auto tree = parse_tree_definition(text, "t.tree");
+    return tree ? static_cast<int>(tree->branches.at(0).points_mm.cols()) : 0;
+  };
+  EXPECT_EQ(points(10, 1), static_cast<int>(std::ceil(10 / kDefinitionSampleRadii)) + 1);
+  EXPECT_EQ(points(10, 4), static_cast<int>(std::ceil(10 / (4 * kDefinitionSampleRadii))) + 1);
+  EXPECT_EQ(points(1000, 0.1), kDefinitionMostSamples + 1);
 }
 
 TEST(TreeDefinition, NodesAndBranchesKeepTheirNamesAndRunSmoothly) {
