@@ -7,18 +7,6 @@
 namespace angiospline {
 namespace {
 
-FaceKind kind_of(RimKind kind) {
-  switch (kind) {
-    case RimKind::kInlet:
-      return FaceKind::kInlet;
-    case RimKind::kOutlet:
-      return FaceKind::kOutlet;
-    case RimKind::kCap:
-      break;
-  }
-  return FaceKind::kCap;
-}
-
 EdgeUse use_of(const NetworkEdge& edge, int use) {
   EdgeUse result;
   const Side& side = edge.sides[index(use)];
@@ -142,7 +130,7 @@ Result<BoundaryModel> boundary_of(const SurfaceNetwork& network) {
     const Rim& rim = network.rims[r];
     BoundaryFace face;
     face.name = rim.name;
-    face.kind = kind_of(rim.kind);
+    face.kind = kind_of_rim(rim.kind);
     face.radius_mm = rim.radius_mm;
     face.shell = topology.components[index(rim.sides.front().patch)];
     face.plane = plane_of(rim, topology.rim_loops[r], model.edges);

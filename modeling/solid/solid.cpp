@@ -41,18 +41,6 @@ double tolerance_for(double gap_mm) {
   return std::max(Precision::Confusion(), kGapMargin * gap_mm);
 }
 
-FaceKind kind_of(RimKind kind) {
-  switch (kind) {
-    case RimKind::kInlet:
-      return FaceKind::kInlet;
-    case RimKind::kOutlet:
-      return FaceKind::kOutlet;
-    case RimKind::kCap:
-      break;
-  }
-  return FaceKind::kCap;
-}
-
 // The straight curve in the (u, v) plane that runs from `a` at parameter `from` to `b` at `to`, on
 // a parameter line. A line has unit speed; where the intervals differ in length it takes a spline.
 // So does a part of a side: a line has no ends, and readers of STEP that do not find the edge's at

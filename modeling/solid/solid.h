@@ -31,6 +31,9 @@ std::string_view to_string(FaceKind kind);
 // The kind a name tells of: "inlet...", "outlet..." and "cap..." (any case), otherwise a wall.
 FaceKind kind_of_name(std::string_view name);
 
+// The kind of the cap that closes a rim.
+FaceKind kind_of_rim(RimKind kind);
+
 // Inlets red, outlets blue, caps grey; walls a soft hue that depends on the name alone.
 Vec3 face_colour(FaceKind kind, std::string_view name);
 

@@ -54,6 +54,18 @@ FaceKind kind_of_name(std::string_view name) {
   return FaceKind::kWall;
 }
 
+FaceKind kind_of_rim(RimKind kind) {
+  switch (kind) {
+    case RimKind::kInlet:
+      return FaceKind::kInlet;
+    case RimKind::kOutlet:
+      return FaceKind::kOutlet;
+    case RimKind::kCap:
+      break;
+  }
+  return FaceKind::kCap;
+}
+
 Vec3 face_colour(FaceKind kind, std::string_view name) {
   switch (kind) {
     case FaceKind::kInlet:
