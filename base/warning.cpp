@@ -79,13 +79,15 @@ constexpr std::array kKinds = {
                 "a face could not be meshed and was not searched for self-intersections"},
     WarningKind{kMeshCoarsened, "mesh-coarsened",
                 "the triangle mesh is coarser than the usual tolerance to limit its size"},
+    WarningKind{kMasksPlacedApart, "masks-placed-apart",
+                "two masks lie at different places and were compared voxel by voxel"},
 };
 
 constexpr bool each_in_its_place() {
   for (std::size_t k = 0; k < kKinds.size(); ++k) {
     if (kKinds[k].code != static_cast<WarningCode>(k)) return false;
   }
-  return kKinds.back().code == kMeshCoarsened;  // the last of the enum
+  return kKinds.back().code == kMasksPlacedApart;  // the last of the enum
 }
 static_assert(each_in_its_place());
 

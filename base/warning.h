@@ -52,6 +52,8 @@ enum class WarningCode {
   // A solid is measured and written.
   kFaceNotSearched,
   kMeshCoarsened,
+  // Two masks are compared.
+  kMasksPlacedApart,
 };
 
 struct Warning {

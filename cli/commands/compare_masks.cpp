@@ -123,7 +123,7 @@ int run(const Arguments& arguments) {
   if (!compared) return report_error(compared.error());
   const bool placed_alike = lie_alike(truth->grid, result->grid);
   if (!placed_alike)
-    console.warn({WarningCode::kUnspecified,
+    console.warn({WarningCode::kMasksPlacedApart,
                   "the masks' origins or directions differ; they are compared voxel by voxel"});
   result->grid = truth->grid;
   std::optional<CenterlineFigures> lines;
