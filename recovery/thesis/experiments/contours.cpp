@@ -57,6 +57,7 @@ class Slice {
 
     // Missed are the points of either that the other does not have (7.3.2).
     const Mask& truth = artery(right).truth;
+    const Mask mask = mask_inside(fit->mesh.nodes_mm, truth.grid);
     double missed = 0;
     for (std::size_t i = 0; i < mask.voxels.size(); ++i)
       missed += (mask.voxels[i] != 0) != (truth.voxels[i] != 0);
