@@ -1,3 +1,5 @@
+#include <array>
+
 #include <gtest/gtest.h>
 
 #include "io/centerlines/csv_columns.h"
@@ -40,8 +42,9 @@ TEST(CsvColumns, TwoOfOneMeaningCannotBeTold) {
 }
 
 TEST(CsvColumns, NeedAPlaceAndARadius) {
-  for (const std::vector<std::string_view>& header :
-       {std::vector<std::string_view>{"x", "y", "radius"}, {"x", "y", "z"}, {}}) {
+  const std::vector<std::vector<std::string_view>> headers = {
+      {"x", "y", "radius"}, {"x", "y", "z"}, {}};
+  for (const std::vector<std::string_view>& header : headers) {
     ASSERT_FALSE(named(header));
     EXPECT_EQ(named(header).error().what, "the header line names no x, y, z and radius");
   }

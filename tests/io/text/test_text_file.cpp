@@ -109,7 +109,12 @@ TEST(PlainText, DropsAByteOrderMarkAndRefusesWhatIsNoText) {
                        "f")
                 .value(),
             "1");
-  EXPECT_EQ(plain_text("\xFF\xFE1", "f").error().what, "is UTF-16 text");
+  EXPECT_EQ(plain_text("\xFF\xFE"
+                       "1",
+                       "f")
+                .error()
+                .what,
+            "is UTF-16 text");
   EXPECT_EQ(plain_text(" \n", "f").error().what, "is empty");
   EXPECT_EQ(plain_text(std::string_view("a\0b", 3), "f").error().what,
             "is not text: byte 1 is zero");
