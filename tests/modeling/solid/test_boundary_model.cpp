@@ -36,8 +36,12 @@ TEST(BoundaryModel, OfANetworkAndOfItsSolidAreTheSame) {
       EXPECT_EQ(a.kind, b.kind);
       EXPECT_EQ(a.is_whole, b.is_whole);
       ASSERT_EQ(a.plane.has_value(), b.plane.has_value());
-      if (a.plane) EXPECT_LT((a.plane->second - b.plane->second).norm(), 1e-12);
-      if (a.patch) EXPECT_EQ(a.patch->control_points(), b.patch->control_points());
+      if (a.plane) {
+        EXPECT_LT((a.plane->second - b.plane->second).norm(), 1e-12);
+      }
+      if (a.patch) {
+        EXPECT_EQ(a.patch->control_points(), b.patch->control_points());
+      }
     }
   }
 }
