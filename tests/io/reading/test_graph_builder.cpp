@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <random>
+#include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -11,7 +13,9 @@ namespace {
 GraphBuilder with_points(int count) {
   GraphBuilder builder("f");
   for (int k = 0; k < count; ++k) {
-    builder.add_point({"p" + std::to_string(k), Vec3(k, 0, 0), 1.0}, 10 + k);
+    std::string id("p");
+    id += std::to_string(k);
+    builder.add_point({std::move(id), Vec3(k, 0, 0), 1.0}, 10 + k);
   }
   return builder;
 }

@@ -24,7 +24,7 @@ std::string bytes_of_values(const std::vector<T>& values, bool big_endian) {
     if (big_endian == (std::endian::native == std::endian::little)) {
       std::reverse(raw.begin(), raw.end());
     }
-    bytes.append(raw.begin(), raw.end());
+    for (const char c : raw) bytes.push_back(c);
   }
   return bytes;
 }
@@ -33,7 +33,8 @@ TEST(VtkNumbers, ReadEveryTypeInBothByteOrders) {
   const auto check = [](auto value, VtkNumber type) {
     EXPECT_EQ(bytes_of(type), sizeof(value));
     for (const bool big : {false, true}) {
-      const std::string bytes = 'x' + bytes_of_values(std::vector{value}, big);  // unaligned
+      std::string bytes("x");  // so that the number is unaligned
+      bytes += bytes_of_values(std::vector{value}, big);
       const ByteOrder order = big ? ByteOrder::kBigEndian : ByteOrder::kLittleEndian;
       EXPECT_EQ(number_at<double>(bytes.data() + 1, type, order), static_cast<double>(value));
     }
@@ -94,7 +95,8 @@ Stored stored(const std::vector<double>& values, bool big, bool compressed, bool
   if (appended) {
     s.array.format = "appended";
     s.array.offset = 3;
-    s.appended = "xyz" + text;
+    s.appended = std::string("xyz");
+    s.appended += text;
   } else {
     s.array.format = "binary";
     s.array.text = text;
