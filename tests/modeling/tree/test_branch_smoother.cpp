@@ -186,6 +186,7 @@ TEST(FollowRules, NoSampleMovesFartherThanAllowedWhereThePlainSplineWould) {
   EXPECT_NEAR((at.row(0) - ends.row(0)).norm(), 0, 1e-9);
   EXPECT_NEAR((at.bottomRows(1) - ends.row(1)).norm(), 0, 1e-9);
   for (Eigen::Index i = 1; i + 1 < at.rows(); ++i) {
+    if (wave.samples.weights(i) == 0) continue;  // halfway between, on the axis
     EXPECT_LT(std::abs(at(i, 0)), std::abs(wave.samples.points(i, 0)));
   }
 }
@@ -253,7 +254,10 @@ TEST(BranchSmoother, TakesNoiseOutOfACircleAndStaysOnIt) {
   EXPECT_NEAR((smooth.path.at(smooth.path.knots().last()).head<3>() - last).norm(), 0, 1e-9);
   EXPECT_NEAR(smooth.path.knots().last(), 20 * std::numbers::pi, 0.3);
   EXPECT_EQ(smooth.radius_reduced_to, 1.0);
-  EXPECT_NEAR(smooth.sharpest_bend, 2.0 / 20, 0.06);
+  // Of the noise little is left in the bends; one sample off by 0.2 between its neighbours bends by
+  // more than 1.
+  EXPECT_GT(smooth.sharpest_bend, 2.0 / 20);
+  EXPECT_LT(smooth.sharpest_bend, 0.3);
   double off = 0;
   for (int k = 0; k <= 200; ++k) {
     const Vec4 p = smooth.path.at(smooth.path.knots().last() * k / 200);
