@@ -74,7 +74,7 @@ TEST(PathFit, StiffensNothingOnAStraightPathAndATightBendUntilItIsNone) {
   EXPECT_FALSE(straight.stiffen(straight.course()));
 
   // An end that looks across its target bends the beam too tightly.
-  const PathEnd turned{{0, 0, 0}, 1, Vec3(std::sin(1.4), 0, std::cos(1.4))};
+  const PathEnd turned{{0, 0, 0}, 1, Vec3(std::sin(1.1), 0, std::cos(1.1))};
   PathFit bent(make_rail(straight_target(30), turned, end), turned, end, kInfinity);
   BSplineCurve<4> curve = bent.course();
   const int samples = 4 * bent.span_count();
