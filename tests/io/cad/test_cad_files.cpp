@@ -75,7 +75,9 @@ TEST_F(CadFiles, ASurfaceThatMovedFartherThanRoundingIsNotTheOneWritten) {
       other.faces[k].samples_mm[17].x() += step * kDigestTolerance * digest.size_mm;
       const auto same = expect_same(other, solid, "f");
       EXPECT_EQ(same.has_value(), step < 1) << digest.faces[k].name;
-      if (!same) EXPECT_EQ(same.error().what, "surface moved: " + digest.faces[k].name);
+      if (!same) {
+        EXPECT_EQ(same.error().what, "surface moved: " + digest.faces[k].name);
+      }
       ++moved;
     }
   }
