@@ -148,8 +148,12 @@ TEST(ShareAround, IsAllAtMarksAndNothingFarFromThem) {
     const auto c = static_cast<Eigen::Index>(k);
     EXPECT_GE(share(c), 0);
     EXPECT_LE(share(c), 1);
-    if (marks[k]) EXPECT_EQ(share(c), 1);
-    if (mesh.nodes[k].normal.z() < 0.3) EXPECT_EQ(share(c), 0);
+    if (marks[k]) {
+      EXPECT_EQ(share(c), 1);
+    }
+    if (mesh.nodes[k].normal.z() < 0.3) {
+      EXPECT_EQ(share(c), 0);
+    }
   }
 }
 

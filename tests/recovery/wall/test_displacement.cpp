@@ -219,8 +219,12 @@ TEST(LargeResiduals, AreWhereTheWallLiesElsewhereAndNowhereElse) {
   ASSERT_TRUE(large.any());
   for (int k = 0; k < mesh.size(); ++k) {
     const double z = mesh.nodes[static_cast<std::size_t>(k)].normal.z();
-    if (std::abs(z) > 0.4) EXPECT_TRUE(large.large[static_cast<std::size_t>(k)]);
-    if (std::abs(z) < 0.1) EXPECT_FALSE(large.large[static_cast<std::size_t>(k)]);
+    if (std::abs(z) > 0.4) {
+      EXPECT_TRUE(large.large[static_cast<std::size_t>(k)]);
+    }
+    if (std::abs(z) < 0.1) {
+      EXPECT_FALSE(large.large[static_cast<std::size_t>(k)]);
+    }
   }
   EXPECT_FALSE(large_residuals(shifted, network, mesh, smoother, {1}).any());
 }
