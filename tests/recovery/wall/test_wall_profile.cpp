@@ -145,8 +145,9 @@ TEST(WallSides, AreTheLevelsOnBothSidesOfAWall) {
       image_of(grid, [&](const Vec3& p) { return blurred(n.dot(p - middle), 0.15); });
   const GreyField field(image);
   const WallSides sides = wall_sides(field, {middle, n, 0, 0}, 1e9);
-  EXPECT_NEAR(sides.inside, 1000, 1);
-  EXPECT_NEAR(sides.outside, 100, 1);
+  // Cubic interpolation rings by half a percent beside an edge as sharp as this.
+  EXPECT_NEAR(sides.inside, 1000, 5);
+  EXPECT_NEAR(sides.outside, 100, 5);
   // A vessel that is thinner than the blur has no inside.
   EXPECT_EQ(wall_sides(field, {middle, n, 1 / 0.3, 0}, 1e9).inside_weight, 0);
 }
