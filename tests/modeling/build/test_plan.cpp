@@ -340,8 +340,9 @@ Sticks random_tree(Random& random) {
       const Vec3 axis = Eigen::AngleAxisd(random.uniform(0, 6.28), tip.direction) * side;
       const Vec3 direction = Eigen::AngleAxisd(angle, axis) * tip.direction;
       const Vec3 from = sticks.tree.tree.nodes[index(tip.node)].position_mm;
-      const int to = sticks.node(from + random.uniform(1, 12) * direction,
-                                 "n" + std::to_string(sticks.tree.tree.nodes.size()));
+      std::string name = std::to_string(sticks.tree.tree.nodes.size());
+      name.insert(name.begin(), 'n');
+      const int to = sticks.node(from + random.uniform(1, 12) * direction, name);
       sticks.line(tip.node, to, random.uniform(0.7, 1.0));
       tips.push_back({to, direction});
       if (k == 0) break;  // the root has one branch
