@@ -1,6 +1,7 @@
 // Closed surfaces: the template, the start from a mask, the fit; and groups of patches that move
 // only as far as they stay sound.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -183,8 +184,8 @@ struct Ball {
     }
   }
   MovedGroup moved(double least_jacobian) {
-    return move_group(group, samples, Points3::Zero(3, group.net.points.cols()), {}, {0.0, 0.03},
-                      least_jacobian);
+    return move_group(group, samples, Points3::Zero(3, group.net.points.cols()), {},
+                      std::array{0.0, 0.03}, least_jacobian);
   }
 };
 
