@@ -115,7 +115,7 @@ TEST(EdgeMeasures, SeeACreaseByItsAngleAndOnlyBetweenWalls) {
     }
     EXPECT_EQ(smooth, 6);  // four seams and two halves of the crease
     EXPECT_EQ(caps, 4);
-    EXPECT_NEAR(worst, crease, 1e-5);
+    EXPECT_NEAR(worst, crease, 1e-4);  // sections are circles within 1.8e-6 radii
   }
 }
 

@@ -110,9 +110,10 @@ TEST(TessellateSolid, IsClosedWithThePartsAndTheVolumeOfTheSolid) {
       EXPECT_FALSE(find_defect(*mesh));
       const MeshMeasure m = measure(*mesh);
       EXPECT_TRUE(m.closed());
-      // A chord that turns by a is a^2 / 24 of the radius off in the mean.
+      // A polygon in a circle whose chords turn by a misses a^2 / 6 of its area; once around the
+      // tube and once, on a torus, along it.
       const double error = std::abs(m.volume_mm3 - exact) / exact;
-      EXPECT_LT(error, 0.2 * turn * turn);
+      EXPECT_LT(error, 0.34 * turn * turn);
       EXPECT_LT(error, before);
       before = error;
       for (const Rim& rim : network.rims) {
