@@ -3,12 +3,12 @@
 set(ANGIOSPLINE_PRECOMPILE <algorithm> <array> <cmath> <functional> <limits> <map> <memory> <optional>
   <string> <utility> <vector> <Eigen/Core> <Eigen/Geometry> <tl/expected.hpp>)
 
-# angiospline_library(<name> ROOMS <folder>... [HEADERS ...] [SOURCES ...] PUBLIC <targets> PRIVATE <targets>)
+# angiospline_library(<name> ROOMS <folder>... [HEADERS ... PRIVATE_HEADERS ... SOURCES ...] PUBLIC <targets> PRIVATE <targets>)
 # One static library: target angiospline_<name>, alias Angiospline::<name>. Its files lie in rooms, subfolders
-# that each name their own files by angiospline_room(); HEADERS (all public) and SOURCES are for a library
-# without rooms. PRECOMPILE: heavy headers that most of its files include, beside those of every library.
+# that each name their own files by angiospline_room(); HEADERS (public), PRIVATE_HEADERS and SOURCES are
+# for a library without rooms. PRECOMPILE: heavy headers that most of its files include, beside those of every library.
 function(angiospline_library name)
-  cmake_parse_arguments(ARG "" "" "ROOMS;HEADERS;SOURCES;PUBLIC;PRIVATE;PRECOMPILE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "ROOMS;HEADERS;PRIVATE_HEADERS;SOURCES;PUBLIC;PRIVATE;PRECOMPILE" ${ARGN})
   set(target angiospline_${name})
   add_library(${target} STATIC ${ARG_SOURCES})
   add_library(Angiospline::${name} ALIAS ${target})

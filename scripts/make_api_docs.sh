@@ -15,7 +15,7 @@ public_headers() {
       { closes = /\)/; gsub(/[()]/, "") }
       /^angiospline_(room|library)/ { inside = 1; next }
       /^(PUBLIC|HEADERS)$/ { taken = inside; next }
-      /^[A-Z]+$/ { taken = 0 }
+      /^[A-Z_]+$/ { taken = 0 }
       taken && /\.h$/ { print folder "/" $0 }
       closes { inside = taken = 0 }'
   done

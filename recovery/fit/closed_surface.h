@@ -28,9 +28,9 @@ SurfaceNetwork with_quartered(const SurfaceNetwork& network, const std::vector<i
 // Of a piece of a mask that becomes a closed surface.
 inline constexpr int kFewestClosedVoxels = 30;
 
-// One ellipsoid for each 26-connected piece of the mask (in closed_pieces.cpp), with its centre and second moments, the
-// largest first. Pieces below 30 voxels are left out, with a warning that says how many.
-// Errors: an empty mask, or one of small pieces only.
+// One ellipsoid for each 26-connected piece of the mask (in closed_pieces.cpp), with its centre and
+// second moments, the largest first. Pieces below 30 voxels are left out, with a warning that says
+// how many. Errors: an empty mask, or one of small pieces only.
 Result<Model> closed_model(const Mask& mask);
 
 }  // namespace angiospline

@@ -8,6 +8,12 @@
 
 namespace angiospline {
 
+// A part of the wall that stayed where it was, or went a part of its way, and why.
+struct HeldRegion {
+  std::string name;
+  std::string why;
+};
+
 struct PartFigures {
   std::string name;
   double residual_mean = 0.0, residual_most = 0.0;  // of |residual|, where known

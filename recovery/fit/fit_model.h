@@ -9,9 +9,10 @@
 #include "base/result.h"
 #include "modeling/build/build_model.h"
 #include "modeling/network/model.h"
-#include "recovery/fit/fit_network.h"
+#include "modeling/network/tessellation.h"
+#include "recovery/fit/figures.h"
 #include "recovery/imaging/image/any_image.h"
-#include "recovery/wall/displacement.h"
+#include "recovery/wall/displacement_options.h"
 #include "recovery/wall/rician_noise.h"
 
 namespace angiospline {

@@ -4,15 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "recovery/fit/figures.h"
 #include "recovery/wall/wall_mesh.h"
 
 namespace angiospline {
-
-// A part of the wall that stayed where it was, or went a part of its way, and why.
-struct HeldRegion {
-  std::string name;
-  std::string why;
-};
 
 struct MovedNetwork {
   SurfaceNetwork network;

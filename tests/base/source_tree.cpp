@@ -68,7 +68,7 @@ std::map<std::string, std::vector<std::string>> keyed_words(const fs::path& path
   const std::size_t start = text.find(command + "(");
   if (start == std::string::npos) return result;
   std::istringstream words(text.substr(start + command.size() + 1, text.find(')', start) - start));
-  static const std::regex kKey("[A-Z]+");
+  static const std::regex kKey("[A-Z_]+");
   std::string key;
   for (std::string word; words >> word;) {
     while (!word.empty() && word.back() == ')') word.pop_back();
@@ -92,7 +92,7 @@ Library library_in(const std::string& folder) {
   }
   if (library.rooms.empty()) {
     library.room_order = {folder};
-    library.rooms[folder] = {words["HEADERS"], {}, words["SOURCES"]};
+    library.rooms[folder] = {words["HEADERS"], words["PRIVATE_HEADERS"], words["SOURCES"]};
   }
   return library;
 }

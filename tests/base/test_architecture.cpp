@@ -125,7 +125,7 @@ TEST(Architecture, PublicHeadersIncludePublicHeadersOnly) {
     }
   }
   EXPECT_GT(open.size(), 40u);
-  EXPECT_LE(open.size(), 105u) << "only what a user of the libraries needs is public";
+  EXPECT_LE(open.size(), 90u) << "only what a user of the libraries needs is public";
 }
 
 TEST(Architecture, FoldersHoldFewFiles) {

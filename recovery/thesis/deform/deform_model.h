@@ -7,12 +7,11 @@
 
 #include "base/progress.h"
 #include "base/result.h"
-#include "modeling/continuity/smooth_network.h"
+#include "kernel/geometry/triangle_mesh.h"
 #include "modeling/network/model.h"
 #include "recovery/fit/figures.h"
-#include "recovery/thesis/deform/mesh.h"
-#include "recovery/thesis/deform/solver.h"
-#include "recovery/thesis/edges/edge_detection.h"
+#include "recovery/imaging/image/image.h"
+#include "recovery/thesis/deform/method.h"
 
 namespace angiospline {
 

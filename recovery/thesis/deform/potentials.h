@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "recovery/thesis/deform/method.h"
 #include "recovery/thesis/edges/edge_detection.h"
 
 namespace angiospline {
@@ -19,11 +20,6 @@ struct EdgePoints {
   Eigen::Index count() const { return at_mm.cols(); }
 };
 EdgePoints edge_points(const EdgeField& field, const ImageGrid& grid);
-
-enum class PotentialKind {
-  kGravity,  // strength exp(-r^2 / reach^2), (6.1): strong near by, nothing far away
-  kSpring,   // strength r / reach, (6.2): strong far away, nothing near by
-};
 
 struct PotentialOptions {
   PotentialKind kind = PotentialKind::kGravity;
