@@ -8,9 +8,6 @@
 
 namespace angiospline {
 
-double largest_move_radii = 0.5;  // of any node from where the mesh has it
-};
-
 // The answer at each node, and what it rests on.
 struct Displacement {
   Eigen::VectorXd normal_mm;        // smooth
