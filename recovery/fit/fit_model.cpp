@@ -10,11 +10,14 @@
 #include "base/index.h"
 #include "recovery/capture/capture.h"
 #include "recovery/fit/closed_surface.h"
+#include "recovery/fit/fit_network.h"
 #include "recovery/fit/reduction.h"
 #include "recovery/fit/refit.h"
 #include "recovery/fit/rings.h"
 #include "recovery/fit/rules.h"
+#include "recovery/wall/displacement.h"
 #include "recovery/wall/evidence_of_greys.h"
+#include "recovery/wall/wall_mesh.h"
 
 namespace angiospline {
 namespace {

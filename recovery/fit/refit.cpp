@@ -7,9 +7,12 @@
 #include "base/index.h"
 #include "base/median.h"
 #include "modeling/check/certificate.h"
+#include "recovery/fit/fit_network.h"
 #include "recovery/fit/refinement.h"
 #include "recovery/fit/rules.h"
+#include "recovery/wall/displacement.h"
 #include "recovery/wall/evidence_of_greys.h"
+#include "recovery/wall/wall_mesh.h"
 #include "recovery/wall/wall_mesh_part.h"
 
 namespace angiospline {

@@ -41,14 +41,14 @@ inline constexpr double kClearContrast =
 inline constexpr int kSagSteps = 16;  // of the mean profile, even
 
 // Of the fit of a blurred edge to the mean profile, in voxel widths.
-struct EdgeFit {
+struct EdgeProfileFit {
   double difference = 1e-4;  // of place and width, for derivatives
   double first_width = 0.4;
   double narrowest = 0.15;  // no image is sharper than that
   double longest_step = 0.3;
   int rounds = 12;
 };
-inline constexpr EdgeFit kEdgeFit;
+inline constexpr EdgeProfileFit kEdgeProfileFit;
 
 // ---- Rician noise (rician_noise)
 

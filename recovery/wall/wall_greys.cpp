@@ -145,18 +145,19 @@ class MagnitudeLevels {
       return off;
     };
 
-    Vec2 edge(0.0, kEdgeFit.first_width);
-    for (int round = 0; round < kEdgeFit.rounds; ++round) {
+    Vec2 edge(0.0, kEdgeProfileFit.first_width);
+    for (int round = 0; round < kEdgeProfileFit.rounds; ++round) {
       const Eigen::VectorXd off = misfit(edge);
       Eigen::MatrixX2d J(means.rows(), 2);
       for (int p = 0; p < 2; ++p) {
-        J.col(p) = (misfit(edge + kEdgeFit.difference * Vec2::Unit(p)) - off) / kEdgeFit.difference;
+        J.col(p) = (misfit(edge + kEdgeProfileFit.difference * Vec2::Unit(p)) - off) /
+                   kEdgeProfileFit.difference;
       }
       const Vec2 step = (J.transpose() * J).ldlt().solve(J.transpose() * off);
       if (!step.allFinite()) break;
-      edge -= step.cwiseMax(-kEdgeFit.longest_step).cwiseMin(kEdgeFit.longest_step);
+      edge -= step.cwiseMax(-kEdgeProfileFit.longest_step).cwiseMin(kEdgeProfileFit.longest_step);
       edge(0) = std::clamp(edge(0), -half_window, half_window);
-      edge(1) = std::clamp(edge(1), kEdgeFit.narrowest, half_window);
+      edge(1) = std::clamp(edge(1), kEdgeProfileFit.narrowest, half_window);
     }
     return edge;
   }

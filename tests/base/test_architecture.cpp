@@ -38,7 +38,7 @@ bool matches(const std::string& target, const char* pattern) {
 }
 
 constexpr std::size_t kUntestedHeaders = 4;
-constexpr int kWalls = 2000;
+constexpr int kWalls = 10;
 
 constexpr const char* kOpenCascade =
     "^(BRep|Geom|TopoDS|TopExp|TopTools|STEP|IGES|XCAF|TDF|TDoc|gp_|Standard_|Poly_|TCol|Shape|BOP|"

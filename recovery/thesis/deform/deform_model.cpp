@@ -6,8 +6,13 @@
 #include <fmt/format.h>
 
 #include "base/index.h"
+#include "modeling/continuity/smooth_network.h"
 #include "recovery/fit/fit_model.h"
+#include "recovery/thesis/deform/mesh.h"
+#include "recovery/thesis/deform/potentials.h"
 #include "recovery/thesis/deform/rules.h"
+#include "recovery/thesis/deform/solver.h"
+#include "recovery/thesis/edges/edge_detection.h"
 #include "recovery/thesis/edges/edge_localisation.h"
 
 namespace angiospline {

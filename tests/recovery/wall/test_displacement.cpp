@@ -8,6 +8,7 @@
 #include "recovery/fit/refinement.h"
 #include "recovery/imaging/rasterize/shapes.h"
 #include "recovery/wall/displacement.h"
+#include "recovery/wall/displacement_options.h"
 #include "recovery/wall/evidence.h"
 #include "recovery/wall/evidence_of_greys.h"
 #include "recovery/wall/wall_greys.h"

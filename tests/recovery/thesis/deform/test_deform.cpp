@@ -11,6 +11,7 @@
 #include "kernel/spline/evaluator.h"
 #include "modeling/build/build_model.h"
 #include "recovery/phantoms/phantom.h"
+#include "recovery/thesis/deform/method.h"
 #include "recovery/thesis/deform/potentials.h"
 #include "recovery/thesis/deform/rules.h"
 #include "recovery/thesis/deform/solver.h"
