@@ -19,7 +19,7 @@ import unicodedata
 LINK = re.compile(r"(?<!\\)\[[^\]]*\]\(([^)\s]+)(?:\s+\"[^\"]*\")?\)")
 SPAN = re.compile(r"`([^`]+)`")
 SOURCE = r"(?:h|cpp|py|sh|js|html|cmake|md|txt|json|swc|tree|cff|yml)"
-PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\." + SOURCE)
+PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\." + SOURCE + r"\b")
 # Files that the program writes or reads share suffixes with ours; only these are surely ours.
 NAME = re.compile(r"[a-z]\w*\.(?:h|cpp)")
 MODULE = re.compile(r"\w+(?:/\w+)+")
