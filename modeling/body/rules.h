@@ -1,5 +1,5 @@
 // The rules by which bodies are fitted and swept. "Radii" are those of the body at the place the
-// rule speaks of. docs/seeding.md, "The body", says what each step does with them.
+// rule speaks of. docs/building.md, "The body", says what each step does with them.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // The rules by which a tree is divided into junctions and bodies, and built. "Radii" are local: of
-// the branch, opening or body the rule speaks of. docs/seeding.md says what each step does with
+// the branch, opening or body the rule speaks of. docs/building.md says what each step does with
 // them and what the whole was measured on.
 #pragma once
 
