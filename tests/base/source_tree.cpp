@@ -67,7 +67,8 @@ std::map<std::string, std::vector<std::string>> keyed_words(const fs::path& path
   std::map<std::string, std::vector<std::string>> result;
   const std::size_t start = text.find(command + "(");
   if (start == std::string::npos) return result;
-  std::istringstream words(text.substr(start + command.size() + 1, text.find(')', start) - start));
+  const std::size_t first = start + command.size() + 1;
+  std::istringstream words(text.substr(first, text.find(')', first) - first));
   static const std::regex kKey("[A-Z_]+");
   std::string key;
   for (std::string word; words >> word;) {
